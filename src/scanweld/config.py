@@ -1,0 +1,162 @@
+"""Settings: one frozen section a stage, every length a multiple of the resolution or the diameter.
+
+Names say the unit: ``*_diameters`` is a multiple of the scans' diameter, ``*_resolutions`` of their
+point spacing, ``*_pixels`` of a range image's footprint on the object, ``*_deg`` an angle.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from scanweld.errors import ConfigError
+
+Unit = Literal["m", "cm", "mm", "in"]
+
+
+class Section(BaseModel):
+    """A frozen group of settings; unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PrepareConfig(Section):
+    """Scan -> range image, mesh and samples."""
+
+    image_pixels: int = Field(300, ge=64, le=2000)
+    """Pixels across the diameter of the working range image, at most (never finer than the scan)."""
+    jump_pixels: float = Field(6.0, gt=1)
+    """Depth step between neighbouring pixels, in footprints, above which the surface is cut."""
+    closing_diameters: float = Field(0.03, ge=0, le=0.2)
+    """Radius by which the silhouette is closed before what lies outside it counts as free."""
+    rim_pixels: int = Field(2, ge=1)
+    """Width of the rim along jumps, holes and the silhouette."""
+    min_cosine: float = Field(0.15, ge=0, lt=1)
+    """Samples whose normal is farther from the viewing direction than this are left out."""
+    num_samples: int = Field(800, ge=100)
+    """Oriented samples of a scan."""
+
+
+class HeatConfig(Section):
+    """PA-HKS keypoints (paper 3.1)."""
+
+    max_front_vertices: int = Field(1500, ge=200)
+    """The front surface is thinned to this many vertices before the eigenproblem."""
+    num_modes: int = Field(120, ge=20)
+    """Eigenpairs of the Laplace-Beltrami operator."""
+    num_times: int = Field(10, ge=3)
+    """Diffusion times, log-spaced from 4 / lambda_k to the longest."""
+    longest_time_diameters2: float = Field(2e-2, gt=0)
+    """Longest diffusion time, in squared diameters."""
+    group_diameters: float = Field(0.05, gt=0)
+    """Keypoints nearer than this, with like signatures, become one."""
+
+
+class PairsConfig(Section):
+    """Pair registration from any start pose."""
+
+    keypoints: Literal["mixed", "heat", "even"] = "mixed"
+    """What anchors the hypotheses: PA-HKS keypoints, evenly spread points, or both."""
+    anchor_diameters: float = Field(0.07, gt=0)
+    """Spacing of evenly spread anchors."""
+    num_turns: int = Field(24, ge=8)
+    """Turns about the normal that are tried for each pair of anchors."""
+    tolerance_diameters: tuple[float, float, float] = (0.04, 0.02, 0.012)
+    """Depth tolerance of the evidence, coarse to fine."""
+    num_survivors: tuple[int, int] = (300, 30)
+    """Hypotheses that go on to the first and to the second refinement."""
+    num_alternatives: int = Field(8, ge=1)
+    """Distinct poses that are kept for a pair."""
+    min_score: float = Field(0.10, ge=0, le=1)
+    """Score below which a pair is not accepted on its own."""
+    min_margin: float = Field(0.2, ge=0, le=1)
+    """Share of the score by which the best pose must beat its best distinct rival."""
+    min_observability: float = Field(5e-4, ge=0)
+    """Smallest over largest eigenvalue of the information matrix below which a pose slides."""
+
+
+class GraphConfig(Section):
+    """Pairs -> poses of all scans that can be placed."""
+
+    max_cycle_deg: float = Field(5.0, gt=0)
+    """Closing error above which a cycle of pairs contradicts itself."""
+    max_cycle_diameters: float = Field(0.03, gt=0)
+    """The same for the shift."""
+
+
+class ContoursConfig(Section):
+    """MM-ICC (paper 3.2)."""
+
+    jump_pixels: float = Field(8.0, gt=1)
+    """Thresholds tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
+    trim: float = Field(0.7, gt=0, le=1)
+    """Share of the contour matches that trimmed ICP keeps."""
+    num_renders: int = Field(20, ge=1)
+    """Outer iterations: predicted range images are rendered anew in each."""
+    num_steps: int = Field(3, ge=1)
+    """Inner iterations between two renderings."""
+
+
+class RefineConfig(Section):
+    """Joint refinement of all poses with surface and contour terms."""
+
+    num_rounds: int = Field(8, ge=1)
+    """Rounds of matching and solving."""
+    match_diameters: tuple[float, float] = (0.02, 0.006)
+    """Farthest match, in the first and in the last round."""
+    contour_weight: float = Field(1.0, ge=0)
+    """Weight of the contour term beside the surface term; 0 leaves it out."""
+
+
+class FusionConfig(Section):
+    """Posed scans -> one mesh."""
+
+    voxel_resolutions: float = Field(1.5, gt=0)
+    """Edge of a voxel."""
+    max_voxels_across: int = Field(400, ge=50)
+    """Voxels across the object's diameter, at most."""
+    truncation_voxels: float = Field(4.0, ge=2)
+    """Distance at which the signed distance is cut off."""
+
+
+class Config(Section):
+    """All settings of a run; ``Config()`` is what users get who give none."""
+
+    seed: int = Field(0, ge=0)
+    """Seed of everything random; together with the scans' content it fixes the output's bytes."""
+    unit: Unit | None = None
+    """Unit of the scans' coordinates; unknown if not given. Nothing depends on it but reports."""
+    prepare: PrepareConfig = PrepareConfig()
+    heat: HeatConfig = HeatConfig()
+    pairs: PairsConfig = PairsConfig()
+    graph: GraphConfig = GraphConfig()
+    contours: ContoursConfig = ContoursConfig()
+    refine: RefineConfig = RefineConfig()
+    fusion: FusionConfig = FusionConfig()
+
+    def to_toml(self) -> str:
+        """The settings as TOML text; what is unknown (None) is left out."""
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+
+
+def load_config(path: Path | None, **overrides: Any) -> Config:  # noqa: ANN401
+    """Settings from defaults, then a TOML file, then top-level overrides that are not None.
+
+    Raises:
+        ConfigError: If the file cannot be read, or a setting is unknown or out of its range.
+    """
+    values: dict[str, Any] = {}
+    if path is not None:
+        try:
+            values = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise ConfigError(f"{path}: cannot be read as TOML settings ({error})") from error
+    values.update({key: value for key, value in overrides.items() if value is not None})
+    try:
+        return Config.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(f"{path or 'settings'}: {where}: {first['msg']}") from error

@@ -1,0 +1,21 @@
+"""What scanweld raises: bad input and bad use, never a failed pair."""
+
+
+class ScanweldError(Exception):
+    """Something that the user can put right; the message is one line that says how."""
+
+
+class ReadError(ScanweldError):
+    """A file that cannot be read as a scan, a mesh or a set of poses."""
+
+
+class WriteError(ScanweldError):
+    """An output that cannot be written."""
+
+
+class ConfigError(ScanweldError):
+    """A setting that is unknown or out of its range."""
+
+
+class InputError(ScanweldError):
+    """Too little, or nothing, to work on."""

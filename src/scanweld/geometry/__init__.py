@@ -1,0 +1,1 @@
+"""Poses, cameras, scans, range images and meshes: what every stage stands on."""

@@ -1,0 +1,70 @@
+"""Triangle meshes: fused models, virtual objects, and the surface between a range image's pixels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class TriangleMesh:
+    """Vertices (V, 3) and counter-clockwise faces (F, 3); normals point out, or to the sensor.
+
+    Attributes:
+        vertices: (V, 3).
+        faces: (F, 3) vertex indices.
+        normals: (V, 3) unit normals or None.
+        colors: (V, 3) uint8 or None.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    normals: FloatArray | None = None
+    colors: ByteArray | None = None
+
+    def __post_init__(self) -> None:
+        put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
+        n = len(self.vertices)
+        put("vertices", frozen(self.vertices, np.float64, (None, 3)))
+        put("faces", frozen(self.faces, np.int64, (None, 3)))
+        if self.faces.size and (self.faces.max() >= n or self.faces.min() < 0):
+            raise ValueError("the faces name vertices that do not exist")
+        if self.normals is not None:
+            put("normals", frozen(self.normals, np.float64, (n, 3)))
+        if self.colors is not None:
+            put("colors", frozen(self.colors, np.uint8, (n, 3)))
+
+
+def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Normals (F, 3) of faces, as long as twice the face's area."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Unit vertex normals (V, 3), area-weighted; zero for vertices without a face."""
+    weighted = face_normals(vertices, faces)
+    normals = np.zeros_like(vertices)
+    for corner in range(3):
+        for axis in range(3):
+            normals[:, axis] += np.bincount(
+                faces[:, corner], weights=weighted[:, axis], minlength=len(vertices)
+            )
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+
+
+def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
+    """Which vertices (V,) lie on an edge that only one face has."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    is_border = np.zeros(num_vertices, dtype=bool)
+    is_border[unique[counts == 1].ravel()] = True
+    return is_border
+
+
+def compact(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """Drop unused vertices: (vertices, faces, kept indices of the old vertices)."""
+    kept, inverse = np.unique(faces, return_inverse=True)
+    return vertices[kept], inverse.reshape(faces.shape), kept
