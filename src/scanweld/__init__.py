@@ -1,0 +1,1 @@
+"""scanweld: unordered range scans of an object to one registered, fused model and a verdict."""

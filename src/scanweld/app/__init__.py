@@ -1,0 +1,1 @@
+"""The command line, the output folder and the report."""

@@ -1,0 +1,1 @@
+"""Contour coherence: M-ICC and MM-ICC (paper 3.2)."""

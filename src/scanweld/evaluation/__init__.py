@@ -1,0 +1,1 @@
+"""Virtual scanner, made objects and error measures."""

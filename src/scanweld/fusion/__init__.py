@@ -1,0 +1,1 @@
+"""Posed scans -> one surface."""

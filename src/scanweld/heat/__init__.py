@@ -1,0 +1,1 @@
+"""PA-HKS keypoints (paper 3.1)."""

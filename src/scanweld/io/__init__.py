@@ -1,0 +1,1 @@
+"""Reading scans, meshes and poses; writing models and poses."""

@@ -1,0 +1,1 @@
+"""Judged pairs -> poses of all scans: view graph and joint refinement."""

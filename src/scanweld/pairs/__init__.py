@@ -1,0 +1,1 @@
+"""Two scans -> judged relative poses."""

@@ -1,0 +1,1 @@
+"""Scan -> range image with a located sensor, mesh and samples."""
