@@ -1,1 +1,5 @@
 """Scan -> range image with a located sensor, mesh and samples."""
+
+from scanweld.prepare.prepare import prepare
+
+__all__ = ["prepare"]

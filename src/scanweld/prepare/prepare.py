@@ -1,0 +1,55 @@
+"""Scan -> prepared scan: sensor located, rendered into a range image, sampled evenly."""
+
+import numpy as np
+
+from scanweld.config import PrepareConfig
+from scanweld.errors import InputError
+from scanweld.geometry.prepared import PreparedScan, RangeImage, Samples
+from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.prepare.range_image import make_range_image
+from scanweld.prepare.resolution import point_spacing
+from scanweld.prepare.sampling import farthest_points
+from scanweld.prepare.sensor import locate_sensor
+
+MIN_SURFACE_PIXELS = 200
+MIN_SAMPLES = 50
+
+
+def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
+    """Make a scan ready for registration.
+
+    Raises:
+        InputError: If the scan shows too little surface to be registered.
+    """
+    located = locate_sensor(scan)
+    assert located.scan_from_sensor is not None
+    points = located.scan_from_sensor.inverse().apply(located.points)
+    resolution = point_spacing(located.points)
+    diameter = principal_diameter(located.points)
+    image, mesh = make_range_image(located, points, resolution, diameter, config)
+    samples = take_samples(image, config)
+    if len(mesh.vertices) < MIN_SURFACE_PIXELS or len(samples.points) < MIN_SAMPLES:
+        raise InputError(
+            f"{scan.name}: only {len(mesh.vertices)} pixels of connected surface among "
+            f"{len(scan.points)} points; a scan needs a surface seen from one side"
+        )
+    return PreparedScan(
+        scan=located,
+        image=image,
+        mesh=mesh,
+        samples=samples,
+        resolution=resolution,
+        diameter=diameter,
+        content_hash=scan.content_hash(),
+    )
+
+
+def take_samples(image: RangeImage, config: PrepareConfig) -> Samples:
+    """Oriented points of an image, evenly spread by area, off the rims, not at grazing incidence."""
+    points = image.points()
+    toward = -np.einsum("hwk,hwk->hw", image.camera.view_directions(points), image.normals)
+    with np.errstate(invalid="ignore"):
+        usable = np.isfinite(image.depth) & ~image.is_rim & (toward > config.min_cosine)
+    candidates, normals = points[usable], image.normals[usable]
+    chosen = farthest_points(candidates, config.num_samples)
+    return Samples(points=candidates[chosen], normals=normals[chosen])

@@ -1,0 +1,216 @@
+"""A scan as a range image at the working resolution, whatever its file looked like."""
+
+import numpy as np
+from scipy import ndimage
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from scanweld.config import PrepareConfig
+from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.geometry.grid import grid_faces
+from scanweld.geometry.mesh import TriangleMesh, border_vertices, face_normals, vertex_normals
+from scanweld.geometry.prepared import RangeImage
+from scanweld.geometry.rasterize import render_depth
+from scanweld.geometry.scan import RangeScan
+from scanweld.prepare.silhouette import classify_pixels
+
+MARGIN_DIAMETERS = 0.05
+MIN_PIECE_SHARE = 0.002
+MAX_EDGE_PIXELS = 4.0
+POINT_PIXELS = 1.6
+NORMAL_SMOOTHING_ROUNDS = 2
+
+
+def make_range_image(
+    scan: RangeScan, points: FloatArray, resolution: float, diameter: float, config: PrepareConfig
+) -> tuple[RangeImage, TriangleMesh]:
+    """Render a scan into a regular range image along its own viewing rays.
+
+    Args:
+        scan: A scan whose sensor is located.
+        points: (N, 3), the scan's points in the sensor frame.
+        resolution: Median spacing of the points.
+        diameter: Diameter of the scan.
+        config: Settings.
+
+    Returns:
+        The range image, and the surface between its pixels cut at depth jumps: vertices are the
+        surface pixels in row-major order, faces and smoothed normals look to the sensor.
+    """
+    organised = scan.grid is not None or scan.faces is not None
+    pixel = max(resolution * (1.0 if organised else POINT_PIXELS), diameter / config.image_pixels)
+    margin = (config.closing_diameters + MARGIN_DIAMETERS) * diameter
+    camera = working_camera(scan, points, pixel, margin)
+    if organised:
+        faces = _scan_faces(scan, points, pixel, config)
+        depth, _ = render_depth(points, faces, camera)
+    else:
+        depth = _splat(points, camera, config.jump_pixels * pixel)
+    depth, mesh = _surface(depth, camera, pixel, config)
+    kind, outside = classify_pixels(
+        np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
+    )
+    image = RangeImage(
+        camera=camera,
+        depth=depth,
+        normals=_to_image(depth, np.asarray(mesh.normals)),
+        kind=kind,
+        outside=outside * pixel,
+        is_rim=_rim(depth, mesh, config.rim_pixels),
+        pixel=pixel,
+    )
+    return image, mesh
+
+
+def working_camera(scan: RangeScan, points: FloatArray, pixel: float, margin: float) -> Camera:
+    """A camera along the scan's viewing rays whose pixels have a given footprint on the object.
+
+    It is a pinhole where the sensor's centre is known and the points lie well before it, else
+    orthographic; its axes are those of the sensor frame.
+    """
+    z = points[:, 2]
+    is_central = scan.camera is not None and scan.camera.model is not CameraModel.ORTHOGRAPHIC
+    if is_central and z.min() > 0.5 * np.hypot(points[:, 0], points[:, 1]).max():
+        model, focal = CameraModel.PINHOLE, float(np.median(z)) / pixel
+        flat = focal * points[:, :2] / z[:, None]
+    else:
+        model, focal = CameraModel.ORTHOGRAPHIC, 1.0 / pixel
+        flat = focal * points[:, :2]
+    low = np.floor(flat.min(axis=0) - margin / pixel)
+    high = np.ceil(flat.max(axis=0) + margin / pixel)
+    width, height = (high - low + 1).astype(int)
+    return Camera(
+        model=model,
+        width=int(width),
+        height=int(height),
+        fx=focal,
+        fy=focal,
+        cx=float(-low[0]),
+        cy=float(-low[1]),
+    )
+
+
+def _scan_faces(
+    scan: RangeScan, points: FloatArray, pixel: float, config: PrepareConfig
+) -> IntArray:
+    if scan.grid is None:
+        assert scan.faces is not None
+        return scan.faces
+    max_step = config.jump_pixels * pixel
+    return grid_faces(scan.grid, points, points[:, 2], max_step, MAX_EDGE_PIXELS * pixel)
+
+
+def _splat(points: FloatArray, camera: Camera, max_step: float) -> FloatArray:
+    """Nearest depth of the points in each pixel; single empty pixels within a surface are filled."""
+    pixels, z = camera.project(points)
+    u, v = np.rint(pixels).astype(np.int64).T
+    depth = np.full((camera.height, camera.width), np.inf)
+    np.minimum.at(depth, (v, u), z)
+    depth[np.isinf(depth)] = np.nan
+    for _ in range(2):
+        depth = _fill_pinholes(depth, max_step)
+    return depth
+
+
+def _fill_pinholes(depth: FloatArray, max_step: float) -> FloatArray:
+    has = np.isfinite(depth)
+    box = np.ones((3, 3))
+    count = ndimage.convolve(has.astype(np.float64), box, mode="constant")
+    total = ndimage.convolve(np.where(has, depth, 0.0), box, mode="constant")
+    high = ndimage.maximum_filter(np.where(has, depth, -np.inf), size=3)
+    low = ndimage.minimum_filter(np.where(has, depth, np.inf), size=3)
+    with np.errstate(invalid="ignore"):
+        fill = ~has & (count >= 5) & (high - low <= max_step)
+    return np.where(fill, total / np.maximum(count, 1), depth)
+
+
+def _surface(
+    depth: FloatArray, camera: Camera, pixel: float, config: PrepareConfig
+) -> tuple[FloatArray, TriangleMesh]:
+    """The mesh of a depth image, and the image without pieces too small to be a surface."""
+    mesh = _depth_mesh(depth, camera, pixel, config)
+    keep = _piece_sizes(mesh) >= MIN_PIECE_SHARE * len(mesh.vertices)
+    if not keep.all():
+        kept = depth.copy()
+        kept[np.isfinite(depth)] = np.where(keep, depth[np.isfinite(depth)], np.nan)
+        depth = kept
+        mesh = _depth_mesh(depth, camera, pixel, config)
+    return depth, mesh
+
+
+def _depth_mesh(
+    depth: FloatArray, camera: Camera, pixel: float, config: PrepareConfig
+) -> TriangleMesh:
+    has = np.isfinite(depth)
+    grid = np.full(depth.shape, -1, dtype=np.int64)
+    grid[has] = np.arange(int(has.sum()))
+    points = camera.unproject_image(depth)[has]
+    faces = grid_faces(
+        grid, points, points[:, 2], config.jump_pixels * pixel, MAX_EDGE_PIXELS * pixel
+    )
+    normals = _smoothed_normals(points, faces, camera)
+    return TriangleMesh(vertices=points, faces=faces, normals=normals)
+
+
+def _smoothed_normals(points: FloatArray, faces: IntArray, camera: Camera) -> FloatArray:
+    """Area-weighted normals (V, 3), averaged over the neighbours along the mesh, to the sensor."""
+    normals = vertex_normals(points, faces)
+    area = np.linalg.norm(face_normals(points, faces), axis=1, keepdims=True)
+    for _ in range(NORMAL_SMOOTHING_ROUNDS):
+        mean = area * normals[faces].sum(axis=1)
+        summed = np.stack(
+            [
+                sum(
+                    np.bincount(faces[:, k], weights=mean[:, axis], minlength=len(points))
+                    for k in range(3)
+                )
+                for axis in range(3)
+            ],
+            axis=1,
+        )
+        length = np.linalg.norm(summed, axis=1, keepdims=True)
+        normals = np.where(length > 0, summed / np.where(length > 0, length, 1.0), normals)
+    lonely = ~(np.abs(normals).sum(axis=1) > 0)
+    normals[lonely] = -camera.view_directions(points[lonely])
+    return normals
+
+
+def _piece_sizes(mesh: TriangleMesh) -> IntArray:
+    """How many vertices (V,) the connected piece of each vertex has."""
+    n = len(mesh.vertices)
+    a, b, c = mesh.faces.T
+    edges = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, c])), shape=(n, n))
+    _, label = connected_components(edges, directed=False)
+    return np.bincount(label)[label] if n else np.zeros(0, dtype=np.int64)
+
+
+def _rim(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
+    has = np.isfinite(depth)
+    border = np.zeros(depth.shape, dtype=bool)
+    has_face = np.zeros(len(mesh.vertices), dtype=bool)
+    has_face[mesh.faces.ravel()] = True
+    border[has] = border_vertices(mesh.faces, len(mesh.vertices)) | ~has_face
+    if width > 1:
+        border = ndimage.binary_dilation(border, np.ones((3, 3), dtype=bool), iterations=width - 1)
+    return border & has
+
+
+def _to_image(depth: FloatArray, values: FloatArray) -> FloatArray:
+    image = np.full((*depth.shape, values.shape[1]), np.nan)
+    image[np.isfinite(depth)] = values
+    return image
+
+
+def _in_view(scan: RangeScan, camera: Camera) -> BoolArray:
+    """Working pixels (H, W) that lie in the scan's own field of view; all, where it is unknown."""
+    if scan.camera is None:
+        return np.ones((camera.height, camera.width), dtype=bool)
+    rays = camera.unproject_image(np.ones((camera.height, camera.width)))
+    pixels, _ = scan.camera.project(rays)
+    u, v = pixels[..., 0], pixels[..., 1]
+    inside_u = (u >= -0.5) & (u <= scan.camera.width - 0.5)
+    return inside_u & (v >= -0.5) & (v <= scan.camera.height - 0.5)
+
+
+

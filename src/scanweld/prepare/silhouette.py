@@ -1,0 +1,40 @@
+"""What the empty pixels of a range image say: free space, or nothing."""
+
+import numpy as np
+from scipy import ndimage
+
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
+from scanweld.geometry.prepared import PixelKind
+
+
+def classify_pixels(
+    is_surface: BoolArray, in_view: BoolArray, closing_pixels: float
+) -> tuple[ByteArray, FloatArray]:
+    """Kinds of the pixels, and how far the free ones lie from the closed silhouette.
+
+    Only pixels outside the closed and filled silhouette are free: gaps in it may be dropouts or
+    shadows as well as air. Where the silhouette leaves the field of view, nothing is free.
+
+    Args:
+        is_surface: (H, W) pixels with a depth, with an empty border at least as wide as the closing.
+        in_view: (H, W) pixels that the sensor could see at all.
+        closing_pixels: Radius of the closing.
+
+    Returns:
+        Kinds (H, W) and distances (H, W) in pixels, 0 inside the silhouette.
+    """
+    silhouette = close(is_surface, closing_pixels)
+    silhouette = ndimage.binary_fill_holes(silhouette | ~in_view) & (silhouette | in_view)
+    kind = np.full(is_surface.shape, PixelKind.UNKNOWN, dtype=np.uint8)
+    kind[~silhouette & in_view] = PixelKind.FREE
+    kind[is_surface] = PixelKind.SURFACE
+    outside = ndimage.distance_transform_edt(~silhouette)
+    return kind, np.where(kind == PixelKind.FREE, outside, 0.0)
+
+
+def close(mask: BoolArray, radius: float) -> BoolArray:
+    """Morphological closing (H, W) by a disc: grown by the radius, then shrunk by it."""
+    if radius <= 0 or not mask.any():
+        return mask.copy()
+    grown = ndimage.distance_transform_edt(~mask) <= radius
+    return (ndimage.distance_transform_edt(grown) > radius) | mask
