@@ -1,0 +1,35 @@
+"""Matches of two scans, each with the one direction in which it holds them together."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray, frozen
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Matches:
+    """Points of scan i matched to scan j, in the sensor frame of j at the pose they were found.
+
+    A match pulls its point along a direction that belongs to j, by minus the residual: point to
+    plane where the direction is a surface normal of j, contour to contour where it is the normal
+    of a contour in j's image.
+
+    Attributes:
+        points: (N, 3) points of i.
+        directions: (N, 3) unit directions of j.
+        residuals: (N,) signed distances from the place of j along the direction.
+    """
+
+    points: FloatArray
+    directions: FloatArray
+    residuals: FloatArray
+
+    def __post_init__(self) -> None:
+        n = len(self.residuals)
+        object.__setattr__(self, "points", frozen(self.points, np.float64, (n, 3)))
+        object.__setattr__(self, "directions", frozen(self.directions, np.float64, (n, 3)))
+        object.__setattr__(self, "residuals", frozen(self.residuals, np.float64, (n,)))
+
+    def __len__(self) -> int:
+        return len(self.residuals)

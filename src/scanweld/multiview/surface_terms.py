@@ -1,0 +1,137 @@
+"""Point-to-plane matches between range images: the closest surface point, found in the image."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.matches import Matches
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PixelKind, PreparedScan
+
+MIN_AGREEMENT = 0.8
+"""Cosine of the two normals below which a match is refused."""
+MIN_COSINE = 0.2
+"""Pixels seen at a more grazing angle than this (cosine) take no part: range is poor there."""
+NUM_WALKS = 3
+"""Projections of the foot point; each brings it closer to the true closest point."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class SurfaceSource:
+    """What point-to-plane matching needs of a scan, in its sensor frame.
+
+    Attributes:
+        points: (N, 3) surface points spread evenly by area, away from rims.
+        normals: (N, 3) their unit normals.
+        camera: (5,) the camera's parameters.
+        depth: (H, W) depths, NaN off the surface.
+        image_normals: (H, W, 3) unit normals.
+        is_usable: (H, W) pixels that may be matched: surface, off the rim, not grazing.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    camera: FloatArray
+    depth: FloatArray
+    image_normals: FloatArray
+    is_usable: BoolArray
+
+
+def surface_source(scan: PreparedScan, num_points: int) -> SurfaceSource:
+    """Thin the range image of a scan to points for matching, evenly by area."""
+    image = scan.image
+    points = image.points()
+    view = image.camera.view_directions(points)
+    cosine = -np.einsum("hwk,hwk->hw", view, image.normals)
+    is_usable = (image.kind == PixelKind.SURFACE) & ~image.is_rim & (cosine > MIN_COSINE)
+    chosen = _even_by_area(1.0 / cosine[is_usable], num_points)
+    return SurfaceSource(
+        points=points[is_usable][chosen],
+        normals=image.normals[is_usable][chosen],
+        camera=image.camera.parameters,
+        depth=image.depth,
+        image_normals=image.normals,
+        is_usable=is_usable,
+    )
+
+
+def surface_matches(i: SurfaceSource, j: SurfaceSource, j_from_i: Pose, radius: float) -> Matches:
+    """Match the points of i to the closest surface points of j, point to plane.
+
+    Refused are matches farther than the radius, with normals that disagree, on j's rim, and
+    those whose closest point j's image does not show.
+    """
+    moved = j_from_i.apply(i.points)
+    turned = j_from_i.turn(i.normals)
+    directions = np.zeros_like(moved)
+    residuals = np.full(len(moved), np.nan)
+    _closest_planes(
+        moved,
+        turned,
+        j.camera,
+        j.depth,
+        j.image_normals,
+        j.is_usable,
+        radius,
+        directions,
+        residuals,
+    )
+    found = np.isfinite(residuals)
+    return Matches(points=moved[found], directions=directions[found], residuals=residuals[found])
+
+
+def _even_by_area(areas: FloatArray, num_points: int) -> np.ndarray:
+    """Indices at equal steps of the summed area."""
+    if len(areas) <= num_points:
+        return np.arange(len(areas))
+    summed = np.cumsum(areas)
+    steps = (np.arange(num_points) + 0.5) * (summed[-1] / num_points)
+    return np.unique(np.searchsorted(summed, steps))
+
+
+@njit(cache=True, nogil=True)
+def _closest_planes(  # pragma: no cover
+    points: FloatArray,
+    normals: FloatArray,
+    camera: FloatArray,
+    depth: FloatArray,
+    image_normals: FloatArray,
+    is_usable: BoolArray,
+    radius: float,
+    directions: FloatArray,
+    residuals: FloatArray,
+) -> None:
+    """Walk: project the point, drop its foot on the plane seen there, project the foot, ..."""
+    height, width = depth.shape
+    is_pinhole = camera[0] == 0.0
+    for n in range(points.shape[0]):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        fx, fy, fz = x, y, z
+        qx = qy = qz = a = b = c = 0.0
+        distance = np.nan
+        for _ in range(NUM_WALKS):
+            if is_pinhole and fz <= 0.0:
+                distance = np.nan
+                break
+            scale = fz if is_pinhole else 1.0
+            u = int(np.floor(camera[1] * fx / scale + camera[3] + 0.5))
+            v = int(np.floor(camera[2] * fy / scale + camera[4] + 0.5))
+            if u < 0 or v < 0 or u >= width or v >= height or not is_usable[v, u]:
+                distance = np.nan
+                break
+            qz = depth[v, u]
+            scale = qz if is_pinhole else 1.0
+            qx = (u - camera[3]) / camera[1] * scale
+            qy = (v - camera[4]) / camera[2] * scale
+            a, b, c = image_normals[v, u, 0], image_normals[v, u, 1], image_normals[v, u, 2]
+            distance = a * (x - qx) + b * (y - qy) + c * (z - qz)
+            fx, fy, fz = x - distance * a, y - distance * b, z - distance * c
+        if np.isnan(distance):
+            continue
+        apart = (x - qx) ** 2 + (y - qy) ** 2 + (z - qz) ** 2
+        agreement = a * normals[n, 0] + b * normals[n, 1] + c * normals[n, 2]
+        if apart <= radius * radius and agreement >= MIN_AGREEMENT:
+            directions[n, 0], directions[n, 1], directions[n, 2] = a, b, c
+            residuals[n] = distance
