@@ -1,0 +1,110 @@
+"""Records of the pair stage: evidence, kinds of pairs and their judged relative poses."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray, frozen
+from scanweld.geometry.pose import Pose
+
+VIOLATION_WEIGHT = 3.0
+CONTRADICT_WEIGHT = 1.5
+FREE_WEIGHT = 1.0
+
+
+class PairKind(StrEnum):
+    """What two scans say about their relative pose."""
+
+    GOOD = "good"
+    SLIDING = "sliding"
+    AMBIGUOUS = "ambiguous"
+    CONTRADICTED = "contradicted"
+    NO_OVERLAP = "no overlap"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Evidence:
+    """What each scan's sensor says of the other's samples, as shares of all samples.
+
+    Shares of one direction or the mean of both directions; they sum to one but for samples whose
+    normals neither agree nor contradict.
+
+    Attributes:
+        agree: On the surface that the other sensor saw, normals alike.
+        front: Before the surface that the other sensor saw: it would have seen them.
+        contradict: On that surface, normals clearly different.
+        free: Where the other sensor looked past the object.
+        occluded: Behind the surface that the other sensor saw.
+        unknown: On pixels that say nothing.
+    """
+
+    agree: float
+    front: float
+    contradict: float
+    free: float
+    occluded: float
+    unknown: float
+
+    @property
+    def score(self) -> float:
+        """Agreement less weighted violations (DESIGN 3.6): 1 is perfect, <= 0 is refused."""
+        violated = VIOLATION_WEIGHT * self.front + CONTRADICT_WEIGHT * self.contradict
+        return self.agree - violated - FREE_WEIGHT * self.free
+
+    @property
+    def violation(self) -> float:
+        """Share of samples that the other sensor contradicts in any way."""
+        return self.front + self.contradict + self.free
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Alternative:
+    """A pose of a pair with its evidence. The frames are those of the result it belongs to."""
+
+    i_from_j: Pose
+    evidence: Evidence
+    overlap: float
+
+    @property
+    def score(self) -> float:
+        """The evidence's score."""
+        return self.evidence.score
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class PairResult:
+    """What was found out about scans i < j; poses relate their sensor frames.
+
+    Attributes:
+        i: Index of the first scan in the run's order,
+        j: of the second.
+        kind: Kind of the pair.
+        reason: Why it is not good, in words; empty where it is.
+        alternatives: Distinct poses, best first; none where nothing fits at all.
+        information: (6, 6) point-to-plane information of the best pose about the matches'
+            centroid, rotation then translation, per match and rotations scaled by 3 / diameter.
+        observability: Smallest over largest eigenvalue of the information.
+        margin: Share of the best score by which it beats its best distinct rival; 1 without rival.
+        rms: Point-to-plane residual of the best pose's matches, in the scans' unit; NaN if none.
+    """
+
+    i: int
+    j: int
+    kind: PairKind
+    reason: str
+    alternatives: tuple[Alternative, ...]
+    information: FloatArray
+    observability: float
+    margin: float
+    rms: float
+
+    def __post_init__(self) -> None:
+        if not self.i < self.j:
+            raise ValueError("a pair is kept with i < j")
+        object.__setattr__(self, "information", frozen(self.information, np.float64, (6, 6)))
+
+    @property
+    def best(self) -> Alternative | None:
+        """The best-scored pose, if there is any."""
+        return self.alternatives[0] if self.alternatives else None

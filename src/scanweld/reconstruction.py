@@ -1,0 +1,156 @@
+"""What a run gives back: poses, model, and how far to trust both. Poses relate scan frames."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from scanweld.config import Config
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import Viewpoint
+from scanweld.pairs.result import Evidence, PairKind
+
+
+class Verdict(StrEnum):
+    """The whole run in one word."""
+
+    GOOD = "good"
+    PARTIAL = "partial"
+    DOUBTFUL = "doubtful"
+    NOTHING = "nothing"
+
+    @property
+    def exit_code(self) -> int:
+        """0 for good, else 3."""
+        return 0 if self is Verdict.GOOD else 3
+
+
+class ScanVerdict(StrEnum):
+    """One scan in one word."""
+
+    GOOD = "good"
+    DOUBTFUL = "doubtful"
+    UNPLACED = "unplaced"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScanReport:
+    """What became of one scan.
+
+    Attributes:
+        verdict: Good, doubtful or unplaced.
+        reason: Why, in a sentence.
+        num_points: Finite points read; 0 if the scan could not be read.
+        num_dropped: NaN and infinite points left out.
+        resolution: Median point spacing, in the scans' unit; None where not measured.
+        diameter: Diagonal of the box along the principal axes; None where not measured.
+        camera: Model of the camera in words, such as "pinhole 300 x 300"; None where none is known.
+        viewpoint: How it is known where the sensor stood.
+        notes: What was assumed.
+        content_hash: Hash of the scan's content; None if it could not be read.
+        num_keypoints: PA-HKS keypoints.
+        edges: Names of the scans it has an accepted pair with.
+        overlap: Share of its surface that some other placed scan saw too; None if unplaced.
+        rms: Point-to-plane residual after the joint refinement, in the scans' unit.
+    """
+
+    verdict: ScanVerdict
+    reason: str
+    num_points: int = 0
+    num_dropped: int = 0
+    resolution: float | None = None
+    diameter: float | None = None
+    camera: str | None = None
+    viewpoint: Viewpoint = Viewpoint.UNKNOWN
+    notes: tuple[str, ...] = ()
+    content_hash: str | None = None
+    num_keypoints: int = 0
+    edges: tuple[str, ...] = ()
+    overlap: float | None = None
+    rms: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class AlternativeReport:
+    """A distinct pose of a pair (scan frames) and its score."""
+
+    i_from_j: Pose
+    score: float
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class PairReport:
+    """What became of one pair; i < j by name, poses relate scan frames.
+
+    Attributes:
+        i: Name of the first scan,
+        j: of the second.
+        kind: What the two scans alone say.
+        accepted: Whether the view graph uses the pair.
+        reason: Why not, or a remark; may be empty.
+        i_from_j: The accepted pose, else the best found; None where nothing fits at all.
+        score: Its score; None where nothing fits.
+        overlap: Share of the scans' samples that agree, of those that could.
+        evidence: Its evidence.
+        margin: Share of the score by which it beats the best distinct rival.
+        observability: Smallest over largest eigenvalue of its information.
+        alternatives: All distinct poses kept, best first.
+    """
+
+    i: str
+    j: str
+    kind: PairKind
+    accepted: bool
+    reason: str
+    i_from_j: Pose | None
+    score: float | None
+    overlap: float
+    evidence: Evidence | None
+    margin: float
+    observability: float
+    alternatives: tuple[AlternativeReport, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StageReport:
+    """Time and memory of a stage, and what it counted.
+
+    Attributes:
+        seconds: Wall time.
+        peak_mb: Peak resident memory of the process at the stage's end.
+        counts: What was counted, such as {"pairs": 45, "accepted": 25}.
+    """
+
+    seconds: float
+    peak_mb: float
+    counts: Mapping[str, int | float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Reconstruction:
+    """Everything a run found out.
+
+    Attributes:
+        poses: world_from_scan of every placed scan, in the frame of its own component.
+        components: Names of the scans of each component, largest first, each with its reference
+            scan (whose pose is the identity) first.
+        unplaced: Reason for every scan that has no pose.
+        scans: Report of every scan.
+        pairs: Report of every pair, ordered by names.
+        mesh: Fused surface of the largest component; None if nothing was placed.
+        verdict: The whole in one word.
+        reasons: Why it is not good, in sentences.
+        stages: Time and memory per stage, in the order of the run.
+        config: The resolved settings.
+    """
+
+    poses: Mapping[str, Pose]
+    components: tuple[tuple[str, ...], ...]
+    unplaced: Mapping[str, str]
+    scans: Mapping[str, ScanReport]
+    pairs: tuple[PairReport, ...]
+    mesh: TriangleMesh | None
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    stages: Mapping[str, StageReport]
+    config: Config
