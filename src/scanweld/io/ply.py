@@ -1,0 +1,176 @@
+"""PLY files as range scans and meshes: what their elements and properties mean."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+
+from scanweld.errors import ReadError
+from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
+from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.geometry.pose import Pose
+from scanweld.io.matrices import pose_from_numbers
+from scanweld.io.ply_body import Columns, Ragged, decode_body
+from scanweld.io.ply_header import PlyElement, PlyHeader, parse_header
+from scanweld.io.raw import RawScan, fan_triangles, to_bytes
+
+logger = logging.getLogger(__name__)
+
+CAMERA_KEY = "scanweld_camera"
+"""``obj_info`` key of a camera: model, width, height, fx, fy, cx, cy."""
+POSE_KEY = "scanweld_scan_from_sensor"
+"""``obj_info`` key of the sensor's pose: a 4x4 matrix, row after row."""
+
+_COLORS = (
+    ("red", "green", "blue"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+    ("r", "g", "b"),
+)
+_INDEX_LISTS = ("vertex_indices", "vertex_index")
+
+
+def read_ply(path: Path, data: bytes) -> RawScan:
+    """A PLY file's points, range grid, faces, colours, confidence and sensor.
+
+    Args:
+        path: The file, for messages.
+        data: Its bytes.
+
+    Raises:
+        ReadError: If the file is broken or holds no vertices with x, y and z.
+    """
+    header = parse_header(path, data)
+    tables = decode_body(header, data)
+    element = header.element("vertex")
+    if element is None:
+        raise ReadError(f"{path}: has no element 'vertex'; export the scan with its points")
+    vertex = tables["vertex"]
+    points = _stack(vertex, ("x", "y", "z"))
+    if points is None:
+        raise ReadError(f"{path}: its vertices lack x, y or z; export the scan with its points")
+    grid, notes = _grid(header, tables)
+    camera = _camera(header)
+    if camera is not None and grid is not None and grid.shape != (camera.height, camera.width):
+        raise ReadError(
+            f"{path}: the camera in its obj_info has {camera.width} x {camera.height} pixels, the "
+            f"range grid {grid.shape[1]} x {grid.shape[0]} cells; correct either"
+        )
+    confidence = _stack(vertex, ("confidence",))
+    return RawScan(
+        points=points,
+        grid=grid,
+        faces=_faces(header, tables),
+        normals=_stack(vertex, ("nx", "ny", "nz")),
+        colors=next(filter(_is_there, (_bytes(path, element, vertex, c) for c in _COLORS)), None),
+        intensity=_column_bytes(path, element, vertex, "intensity"),
+        confidence=None if confidence is None else confidence[:, 0],
+        camera=camera,
+        scan_from_sensor=_sensor_pose(header),
+        notes=notes,
+    )
+
+
+def _is_there(colors: ByteArray | None) -> bool:
+    return colors is not None
+
+
+def _stack(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
+    """Scalar columns side by side (N, k), or None if one is missing."""
+    found = [columns.get(name) for name in names]
+    if any(column is None or isinstance(column, Ragged) for column in found):
+        return None
+    return np.stack([np.asarray(column, dtype=np.float64) for column in found], axis=1)
+
+
+def _bytes(
+    path: Path, element: PlyElement, columns: Columns, names: tuple[str, ...]
+) -> ByteArray | None:
+    """Columns as bytes (N, k), by the types that the header declares; None if missing."""
+    values = _stack(columns, names)
+    if values is None:
+        return None
+    types = {prop.name: prop.type for prop in element.properties}
+    declared = types[names[0]]
+    found = to_bytes(values, is_float=declared[0] == "f", is_wide=declared[1] != "1")
+    if found is None:
+        logger.warning("%s: %s are on no known scale, so they are left out", path, ", ".join(names))
+    return found
+
+
+def _column_bytes(path: Path, element: PlyElement, columns: Columns, name: str) -> ByteArray | None:
+    found = _bytes(path, element, columns, (name,))
+    return None if found is None else found[:, 0]
+
+
+def _index_list(columns: Columns) -> tuple[IntArray, IntArray] | None:
+    """Lengths and values of the element's list of vertex indices."""
+    for name in _INDEX_LISTS:
+        column = columns.get(name)
+        if isinstance(column, Ragged):
+            return column.counts, column.values.astype(np.int64)
+    return None
+
+
+def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | None, tuple[str, ...]]:
+    """The range grid (rows, columns) of vertex indices, -1 where a cell is empty."""
+    element = header.element("range_grid")
+    if element is None or element.count == 0:
+        return None, ()
+    cells = _index_list(tables["range_grid"])
+    if cells is None:
+        raise ReadError(f"{header.path}: its range_grid has no list vertex_indices; export it anew")
+    shape = (header.info.get("num_rows", ""), header.info.get("num_cols", ""))
+    if not all(text.isdigit() for text in shape):
+        logger.warning("%s: range_grid without num_rows and num_cols, left out", header.path)
+        return None, ("range grid of unknown shape left out",)
+    rows, columns = (int(text) for text in shape)
+    if rows * columns != element.count:
+        raise ReadError(
+            f"{header.path}: its range_grid has {element.count} cells, not num_rows x num_cols = "
+            f"{rows} x {columns}; export it anew"
+        )
+    counts, values = cells
+    if counts.max() > 1:
+        raise ReadError(
+            f"{header.path}: a cell of its range_grid holds several points; export it anew"
+        )
+    grid = np.full(element.count, -1, dtype=np.int64)
+    grid[counts == 1] = values
+    return grid.reshape(rows, columns), ()
+
+
+def _faces(header: PlyHeader, tables: dict[str, Columns]) -> IntArray | None:
+    polygons = _index_list(tables.get("face", {}))
+    return None if polygons is None else fan_triangles(*polygons)
+
+
+def _camera(header: PlyHeader) -> Camera | None:
+    """The camera that a virtual scanner wrote down."""
+    text = header.info.get(CAMERA_KEY)
+    if text is None:
+        return None
+    model, *numbers = text.split()
+    try:
+        width, height = (int(word) for word in numbers[:2])
+        fx, fy, cx, cy = (float(word) for word in numbers[2:])
+        return Camera(
+            model=CameraModel[model.upper()], width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy
+        )
+    except (ValueError, KeyError) as error:
+        raise ReadError(
+            f"{header.path}: 'obj_info {CAMERA_KEY} {text}' is not a model, width, height, fx, fy, "
+            "cx and cy; correct or remove the line"
+        ) from error
+
+
+def _sensor_pose(header: PlyHeader) -> Pose | None:
+    text = header.info.get(POSE_KEY)
+    if text is None:
+        return None
+    try:
+        return pose_from_numbers([float(word) for word in text.split()])
+    except ValueError as error:
+        raise ReadError(
+            f"{header.path}: 'obj_info {POSE_KEY}' is not a rigid motion of 16 numbers ({error}); "
+            "correct or remove the line"
+        ) from error

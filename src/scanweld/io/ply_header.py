@@ -1,0 +1,147 @@
+"""The header of a PLY file: which elements its body holds, in which types and order."""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+from scanweld.errors import ReadError
+
+logger = logging.getLogger(__name__)
+
+# Both spellings of every scalar type -> NumPy's code without the byte order.
+SCALAR_TYPES = {
+    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
+    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"int64": "i8", "uint64": "u8", "float": "f4", "double": "f8"},
+    **{"float32": "f4", "float64": "f8"},
+}
+FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PlyProperty:
+    """A property: NumPy codes of its values and, for a list, of the length before them."""
+
+    name: str
+    type: str
+    count_type: str | None = None
+
+    @property
+    def is_list(self) -> bool:
+        """Whether each row holds a list of values."""
+        return self.count_type is not None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PlyElement:
+    """An element: so many rows with these properties in this order."""
+
+    name: str
+    count: int
+    properties: tuple[PlyProperty, ...]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PlyHeader:
+    """All that stands before ``end_header``, and where the body begins.
+
+    Attributes:
+        path: The file, for messages.
+        format: ``ascii``, ``binary_little_endian`` or ``binary_big_endian``.
+        elements: In the order of the body.
+        info: ``obj_info`` entries, first word -> the rest of the line.
+        comments: ``comment`` lines.
+        body_start: Offset of the body in bytes.
+    """
+
+    path: Path
+    format: str
+    elements: tuple[PlyElement, ...]
+    info: dict[str, str]
+    comments: tuple[str, ...]
+    body_start: int
+
+    def element(self, name: str) -> PlyElement | None:
+        """The element of that name, if there is one."""
+        return next((element for element in self.elements if element.name == name), None)
+
+
+def parse_header(path: Path, data: bytes) -> PlyHeader:
+    """Parse the header of a PLY file's bytes; lines end in LF, CRLF or CR.
+
+    Lines that begin with no PLY keyword are skipped (six scans of the Stanford dragon have some).
+
+    Raises:
+        ReadError: If the data does not begin with a PLY header.
+    """
+    lines, body_start = _header_lines(path, data)
+    form: str | None = None
+    info: dict[str, str] = {}
+    comments: list[str] = []
+    elements: list[tuple[str, int, list[PlyProperty]]] = []
+    for line in lines:
+        keyword, _, rest = line.strip().partition(" ")
+        words = rest.split()
+        if keyword == "format":
+            form = words[0] if words else None
+        elif keyword == "obj_info":
+            info[words[0] if words else ""] = " ".join(words[1:])
+        elif keyword == "comment":
+            comments.append(rest)
+        elif keyword == "element":
+            elements.append(_element(path, line, words))
+        elif keyword == "property":
+            if not elements:
+                raise ReadError(f"{path}: '{line}' stands before any element; export the file anew")
+            elements[-1][2].append(_property(path, line, words))
+        elif keyword:
+            logger.debug("%s: header line %r skipped", path, line)
+    if form not in FORMATS:
+        raise ReadError(
+            f"{path}: unknown PLY format {form!r}; save it as one of {', '.join(FORMATS)}"
+        )
+    return PlyHeader(
+        path=path,
+        format=form,
+        elements=tuple(
+            PlyElement(name=name, count=count, properties=tuple(properties))
+            for name, count, properties in elements
+        ),
+        info=info,
+        comments=tuple(comments),
+        body_start=body_start,
+    )
+
+
+def _header_lines(path: Path, data: bytes) -> tuple[list[str], int]:
+    """The lines between ``ply`` and ``end_header``, and where the body begins."""
+    if not data:
+        raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
+    # The first line tells the line ending; searching on would misread binary bodies.
+    newline = next((n for n in (b"\r\n", b"\n", b"\r") if data.startswith(b"ply" + n)), None)
+    if newline is None:
+        raise ReadError(f"{path}: not a PLY file (it does not begin with 'ply'); leave it out")
+    end = data.find(newline + b"end_header")
+    if end < 0:
+        raise ReadError(
+            f"{path}: the header has no 'end_header', the file is cut off; copy it again"
+        )
+    after = data.find(newline, end + len(newline))
+    body_start = len(data) if after < 0 else after + len(newline)
+    text = data[:end].decode("utf-8", errors="replace")
+    return text.split(newline.decode())[1:], body_start
+
+
+def _element(path: Path, line: str, words: list[str]) -> tuple[str, int, list[PlyProperty]]:
+    if len(words) != 2 or not words[1].isdigit():
+        raise ReadError(f"{path}: '{line}' is not 'element NAME COUNT'; export the file anew")
+    return words[0], int(words[1]), []
+
+
+def _property(path: Path, line: str, words: list[str]) -> PlyProperty:
+    types = [SCALAR_TYPES.get(word) for word in words[:-1]]
+    if len(words) == 2 and types[0] is not None:
+        return PlyProperty(name=words[1], type=types[0])
+    if len(words) == 4 and words[0] == "list" and types[1] is not None and types[2] is not None:
+        return PlyProperty(name=words[3], type=types[2], count_type=types[1])
+    raise ReadError(f"{path}: '{line}' is not a property of a known type; export the file anew")

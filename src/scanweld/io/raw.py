@@ -1,0 +1,158 @@
+"""What every reader hands over, and how it becomes a scan or a mesh."""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scanweld.errors import ReadError
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from scanweld.geometry.camera import Camera
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import RangeScan, Viewpoint
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class RawScan:
+    """A file's content as it stands there: points may be NaN, and indices out of range.
+
+    Attributes as in ``RangeScan``; intensity (N,) uint8 is grey, used where there are no colours.
+    """
+
+    points: FloatArray
+    grid: IntArray | None = None
+    faces: IntArray | None = None
+    normals: FloatArray | None = None
+    colors: ByteArray | None = None
+    intensity: ByteArray | None = None
+    confidence: FloatArray | None = None
+    camera: Camera | None = None
+    scan_from_sensor: Pose | None = None
+    notes: tuple[str, ...] = ()
+
+
+def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
+    """The scan of a file: points that are not finite dropped, grid and faces re-indexed.
+
+    Points that lie in no cell of the grid are kept, and the scan's notes count them. Normals and
+    confidences that are not finite become zero: nothing is known there.
+
+    Raises:
+        ReadError: If an index names no point, or no finite point is left.
+    """
+    finite = _checked(path, raw)
+    new_index = np.where(finite, np.cumsum(finite) - 1, -1)
+    dropped = int((~finite).sum())
+    if dropped == len(finite):
+        raise ReadError(f"{path}: holds no points, or none that is finite; leave it out")
+    grid = None if raw.grid is None else np.where(raw.grid >= 0, new_index[raw.grid], -1)
+    faces = None if raw.faces is None or not len(raw.faces) else _whole(new_index[raw.faces])
+    colors = raw.colors
+    notes = raw.notes
+    if colors is None and raw.intensity is not None:
+        colors = np.repeat(raw.intensity[:, None], 3, axis=1)
+        notes += ("intensity read as grey",)
+    if grid is not None and (loose := _num_loose(grid, int(finite.sum()))):
+        notes += (f"{loose} points lie in no cell of the grid",)
+    if dropped:
+        logger.info("%s: %d points that are not finite dropped", path, dropped)
+    return RangeScan(
+        name=name,
+        points=raw.points[finite],
+        grid=grid,
+        faces=faces,
+        normals=None if raw.normals is None else _zero_unless_finite(raw.normals[finite]),
+        colors=None if colors is None else colors[finite],
+        confidence=None if raw.confidence is None else _zero_unless_finite(raw.confidence[finite]),
+        camera=raw.camera,
+        scan_from_sensor=raw.scan_from_sensor,
+        viewpoint=Viewpoint.UNKNOWN if raw.scan_from_sensor is None else Viewpoint.GIVEN,
+        num_dropped=dropped,
+        notes=notes,
+    )
+
+
+def to_mesh(path: Path, raw: RawScan) -> TriangleMesh:
+    """The mesh of a file; vertices that are not finite are dropped with their faces.
+
+    Raises:
+        ReadError: If an index names no vertex, or no face is left.
+    """
+    finite = _checked(path, raw)
+    new_index = np.where(finite, np.cumsum(finite) - 1, -1)
+    faces = np.zeros((0, 3), np.int64) if raw.faces is None else _whole(new_index[raw.faces])
+    if not len(faces):
+        raise ReadError(f"{path}: has no faces, so it is no mesh; give a file with triangles")
+    return TriangleMesh(
+        vertices=raw.points[finite],
+        faces=faces,
+        normals=None if raw.normals is None else _zero_unless_finite(raw.normals[finite]),
+        colors=None if raw.colors is None else raw.colors[finite],
+    )
+
+
+def fan_triangles(counts: IntArray, corners: IntArray) -> IntArray:
+    """Triangles (M, 3) of polygons: fans about each one's first corner.
+
+    Args:
+        counts: (P,) corners of each polygon; those with fewer than three are left out.
+        corners: (sum of counts,) vertex indices, polygon after polygon.
+    """
+    first = np.cumsum(counts) - counts
+    sizes = np.maximum(counts - 2, 0)
+    begin = np.repeat(first, sizes)
+    step = np.arange(int(sizes.sum())) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    return np.stack([corners[begin], corners[begin + step + 1], corners[begin + step + 2]], axis=1)
+
+
+def to_bytes(values: NDArray, is_float: bool, is_wide: bool = False) -> ByteArray | None:
+    """Colours or intensities as 0 to 255; None where their scale cannot be told.
+
+    Args:
+        values: Of any shape.
+        is_float: Whether they were stored as floating point: then up to 1 means parts of one.
+        is_wide: Whether they were stored as 16-bit integers, up to 65535.
+    """
+    scaled = np.nan_to_num(values.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+    top = float(scaled.max(initial=0.0))
+    if is_float and top <= 1.0:
+        scaled = scaled * 255.0
+    elif is_wide and top > 255.0:
+        scaled = scaled / 257.0
+    if scaled.size and (scaled.max() > 255.5 or scaled.min() < 0.0):
+        return None
+    return np.rint(np.minimum(scaled, 255.0)).astype(np.uint8)
+
+
+def _checked(path: Path, raw: RawScan) -> BoolArray:
+    """Which points are finite, after making sure that all indices name points."""
+    for what, indices, lowest in (("range grid cells", raw.grid, -1), ("faces", raw.faces, 0)):
+        if indices is None or not indices.size:
+            continue
+        for index in (int(indices.min()), int(indices.max())):
+            if not lowest <= index < len(raw.points):
+                raise ReadError(
+                    f"{path}: its {what} name point {index}, but points go from 0 to "
+                    f"{len(raw.points) - 1}; export it anew"
+                )
+    return np.asarray(np.isfinite(raw.points).all(axis=1))
+
+
+def _whole(faces: IntArray) -> IntArray:
+    """The faces all of whose corners are left."""
+    return faces[(faces >= 0).all(axis=1)]
+
+
+def _num_loose(grid: IntArray, num_points: int) -> int:
+    in_grid = np.zeros(num_points, dtype=bool)
+    in_grid[grid[grid >= 0]] = True
+    return int(num_points - in_grid.sum())
+
+
+def _zero_unless_finite(values: FloatArray) -> FloatArray:
+    return np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)

@@ -1,0 +1,52 @@
+"""One door for all formats: ``read_scan`` and ``read_mesh``."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from scanweld.errors import ReadError
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.scan import RangeScan
+from scanweld.io.ply import read_ply
+from scanweld.io.raw import RawScan, to_mesh, to_scan
+
+Reader = Callable[[Path, bytes], RawScan]
+
+READERS: dict[str, Reader] = {".ply": read_ply}
+"""Suffix in lower case -> reader."""
+
+
+def read_scan(path: Path | str, name: str | None = None) -> RangeScan:
+    """Read a file as one scan, in the coordinates and the unit of the file.
+
+    Args:
+        path: PLY.
+        name: The scan's name; the file's stem if not given.
+
+    Raises:
+        ReadError: If the file cannot be read as a scan; the message says why and what to do.
+    """
+    path = Path(path)
+    return to_scan(path, path.stem if name is None else name, _read(path))
+
+
+def read_mesh(path: Path | str) -> TriangleMesh:
+    """Read a file as a triangle mesh; polygons become fans of triangles.
+
+    Raises:
+        ReadError: If the file cannot be read or has no faces.
+    """
+    path = Path(path)
+    return to_mesh(path, _read(path))
+
+
+def _read(path: Path) -> RawScan:
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise ReadError(f"{path}: unknown format; scanweld reads {', '.join(READERS)}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    if not data:
+        raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
+    return reader(path, data)
