@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose
@@ -133,7 +133,7 @@ def _looking_in(azimuth_deg: float, elevation_deg: float, roll_deg: float, up: A
     return np.roll(np.stack([x, y, away], axis=1), shift, axis=0)
 
 
-def _render(mesh: TriangleMesh, view: View) -> tuple[FloatArray, np.ndarray]:
+def _render(mesh: TriangleMesh, view: View) -> tuple[FloatArray, IntArray]:
     vertices = view.world_from_sensor.inverse().apply(mesh.vertices)
     return render_depth(vertices, mesh.faces, view.camera)
 
