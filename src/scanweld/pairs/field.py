@@ -1,0 +1,99 @@
+"""A scan laid out for the compiled kernels: what its sensor saw, and its closest points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.prepared import PreparedScan, RangeImage
+
+VOXEL_DIAMETERS = 0.01
+GRID_MARGIN_DIAMETERS = 0.09
+
+RASTER_DEPTH, RASTER_NORMAL, RASTER_OUTSIDE, RASTER_KIND = 0, 1, 4, 5
+"""Channels of a raster: depth, normal (three), distance outside the silhouette, kind."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class ScanField:
+    """What pair registration asks of a scan, in its sensor frame, as plain arrays.
+
+    Attributes:
+        camera: (5,) parameters of the range image's camera.
+        raster: (H, W, 6) float32 depth, normal, outside, kind of each pixel.
+        points: (N, 3) evenly spread samples, any prefix of which is evenly spread too.
+        normals: (N, 3) their normals.
+        centre: (3,) mean of the samples.
+        surface: (M, 7) points, normals and a flag that is 1 off the rim: targets of matching.
+        closest: (A, B, C) int32 index into surface of the point nearest to each voxel.
+        origin: (4,) centre of voxel (0, 0, 0), and the voxels' edge.
+    """
+
+    camera: FloatArray
+    raster: NDArray[np.float32]
+    points: FloatArray
+    normals: FloatArray
+    centre: FloatArray
+    surface: FloatArray
+    closest: NDArray[np.int32]
+    origin: FloatArray
+
+
+def make_field(scan: PreparedScan, diameter: float) -> ScanField:
+    """Lay out a scan; lengths follow the diameter of the run, so that all scans are alike."""
+    samples = scan.samples
+    surface, closest, origin = _closest_points(scan, diameter)
+    return ScanField(
+        camera=scan.image.camera.parameters,
+        raster=_raster(scan.image),
+        points=np.array(samples.points),
+        normals=np.array(samples.normals),
+        centre=samples.points.mean(axis=0),
+        surface=surface,
+        closest=closest,
+        origin=origin,
+    )
+
+
+def _raster(image: RangeImage) -> NDArray[np.float32]:
+    raster = np.zeros((*image.depth.shape, 6), dtype=np.float32)
+    raster[..., RASTER_DEPTH] = image.depth
+    raster[..., RASTER_NORMAL : RASTER_NORMAL + 3] = image.normals
+    raster[..., RASTER_OUTSIDE] = image.outside
+    raster[..., RASTER_KIND] = image.kind
+    return raster
+
+
+def _closest_points(
+    scan: PreparedScan, diameter: float
+) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
+    """One surface point for each occupied voxel, and for each voxel the nearest occupied one."""
+    edge = VOXEL_DIAMETERS * diameter
+    vertices, off_rim = scan.mesh.vertices, ~scan.image.is_rim[np.isfinite(scan.image.depth)]
+    origin = vertices.min(axis=0) - GRID_MARGIN_DIAMETERS * diameter
+    span = vertices.max(axis=0) + GRID_MARGIN_DIAMETERS * diameter - origin
+    shape = np.ceil(span / edge).astype(np.int64) + 1
+    cell = np.rint((vertices - origin) / edge).astype(np.int64)
+    flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
+    chosen = _representatives(flat, vertices - origin - cell * edge, off_rim)
+    normals = np.asarray(scan.mesh.normals)
+    surface = np.column_stack([vertices, normals, off_rim])[chosen].astype(np.float64)
+
+    index = np.full(shape, -1, dtype=np.int32)
+    index.ravel()[flat[chosen]] = np.arange(len(chosen), dtype=np.int32)
+    nearest = ndimage.distance_transform_edt(
+        index < 0, return_distances=False, return_indices=True
+    )
+    assert isinstance(nearest, np.ndarray)
+    closest = index[tuple(nearest)]
+    return np.ascontiguousarray(surface), np.ascontiguousarray(closest), np.append(origin, edge)
+
+
+def _representatives(flat: IntArray, offsets: FloatArray, off_rim: NDArray[np.bool_]) -> IntArray:
+    """Index of one point for each voxel: off the rim if it has one, the most central of them."""
+    distance2 = (offsets**2).sum(axis=1)
+    order = np.lexsort((distance2, ~off_rim, flat))
+    _, first = np.unique(flat[order], return_index=True)
+    return order[first]

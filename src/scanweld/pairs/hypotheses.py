@@ -1,0 +1,151 @@
+"""Pose hypotheses from oriented points: any start pose, every pair of anchors, every turn."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from scanweld.geometry.arrays import FloatArray, frozen
+from scanweld.pairs.field import ScanField
+from scanweld.pairs.result import CONTRADICT_WEIGHT, FREE_WEIGHT, VIOLATION_WEIGHT
+from scanweld.pairs.visibility import (
+    AGREE,
+    CONTRADICT,
+    FREE,
+    FRONT,
+    ask_backward,
+    ask_forward,
+    kernel_view,
+)
+
+NUM_FIRST_LOOK = 12
+NUM_SECOND_LOOK = 64
+FIRST_LOOK_FLOOR = -0.35
+"""Score of the first few samples below which a hypothesis is not looked at again."""
+
+WEIGHTS = np.zeros(7)
+WEIGHTS[AGREE] = 1.0
+WEIGHTS[FRONT] = -VIOLATION_WEIGHT
+WEIGHTS[CONTRADICT] = -CONTRADICT_WEIGHT
+WEIGHTS[FREE] = -FREE_WEIGHT
+WEIGHTS.flags.writeable = False
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Anchors:
+    """Oriented points (K, 3), with unit normals (K, 3), on which hypotheses are hung."""
+
+    points: FloatArray
+    normals: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen(self.points, np.float64, (None, 3)))
+        object.__setattr__(self, "normals", frozen(self.normals, np.float64, (len(self.points), 3)))
+
+    def frames(self) -> FloatArray:
+        """(K, 12): for each anchor a rotation whose third column is the normal, then the point."""
+        n = self.normals
+        least = np.eye(3)[np.argmin(np.abs(n), axis=1)]
+        x = np.cross(least, n)
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        rotation = np.stack([x, np.cross(n, x), n], axis=2)
+        return np.ascontiguousarray(np.column_stack([rotation.reshape(-1, 9), self.points]))
+
+
+def sweep(
+    i: ScanField,
+    j: ScanField,
+    anchors_i: Anchors,
+    anchors_j: Anchors,
+    num_turns: int,
+    tolerance: float,
+    max_count: int,
+) -> tuple[FloatArray, FloatArray]:
+    """The best-scored hypotheses that lay an anchor of j onto one of i.
+
+    Args:
+        i: First scan.
+        j: Second scan.
+        anchors_i: Anchors of i.
+        anchors_j: Anchors of j.
+        num_turns: Turns about the normal tried for each pair of anchors.
+        tolerance: Depth tolerance of the evidence, in the scans' unit.
+        max_count: How many are kept.
+
+    Returns:
+        Pose rows (K, 12) of i_from_j, best first, and their scores (K,).
+    """
+    if len(anchors_i.points) == 0 or len(anchors_j.points) == 0:
+        return np.zeros((0, 12)), np.zeros(0)
+    angles = 2 * np.pi * np.arange(num_turns) / num_turns
+    turns = np.column_stack([np.cos(angles), np.sin(angles)])
+    frames_i, frames_j = anchors_i.frames(), anchors_j.frames()
+    scores = _score_all(
+        *kernel_view(i), *kernel_view(j), frames_i, frames_j, turns, WEIGHTS, tolerance
+    )
+    flat = scores.ravel()
+    order = np.argsort(-flat, kind="stable")[:max_count]
+    order = order[flat[order] > FIRST_LOOK_FLOOR]
+    a, b, turn = np.unravel_index(order, scores.shape)
+    poses = np.zeros((len(order), 12))
+    for row in range(len(order)):
+        _hang(frames_i[a[row]], frames_j[b[row]], turns[turn[row]], poses[row])
+    return poses, flat[order]
+
+
+@njit(cache=True, nogil=True)
+def _hang(frame_i: FloatArray, frame_j: FloatArray, turn: FloatArray, pose: FloatArray) -> None:
+    """i_from_j = frame_i turned about its normal, after the inverse of frame_j."""
+    c, s = turn[0], turn[1]
+    for r in range(3):
+        x, y, n = frame_i[3 * r], frame_i[3 * r + 1], frame_i[3 * r + 2]
+        x, y = c * x + s * y, c * y - s * x
+        for k in range(3):
+            pose[3 * r + k] = (
+                x * frame_j[3 * k] + y * frame_j[3 * k + 1] + n * frame_j[3 * k + 2]
+            )
+    for r in range(3):
+        pose[9 + r] = frame_i[9 + r] - (
+            pose[3 * r] * frame_j[9] + pose[3 * r + 1] * frame_j[10] + pose[3 * r + 2] * frame_j[11]
+        )
+
+
+@njit(cache=True, nogil=True)
+def _score_all(
+    camera_i: FloatArray,
+    raster_i: NDArray[np.float32],
+    points_i: FloatArray,
+    normals_i: FloatArray,
+    camera_j: FloatArray,
+    raster_j: NDArray[np.float32],
+    points_j: FloatArray,
+    normals_j: FloatArray,
+    frames_i: FloatArray,
+    frames_j: FloatArray,
+    turns: FloatArray,
+    weights: FloatArray,
+    tolerance: float,
+) -> FloatArray:
+    scores = np.full((frames_i.shape[0], frames_j.shape[0], turns.shape[0]), -np.inf)
+    num = min(NUM_SECOND_LOOK, points_i.shape[0], points_j.shape[0])
+    pose = np.empty(12)
+    for a in range(frames_i.shape[0]):
+        for b in range(frames_j.shape[0]):
+            for t in range(turns.shape[0]):
+                _hang(frames_i[a], frames_j[b], turns[t], pose)
+                total = 0.0
+                for s in range(num):
+                    if s == NUM_FIRST_LOOK and total < 2 * NUM_FIRST_LOOK * FIRST_LOOK_FLOOR:
+                        break
+                    total += weights[
+                        ask_backward(
+                            camera_j, raster_j, points_i[s], normals_i[s], pose, tolerance
+                        )
+                    ]
+                    total += weights[
+                        ask_forward(camera_i, raster_i, points_j[s], normals_j[s], pose, tolerance)
+                    ]
+                else:
+                    scores[a, b, t] = total / (2 * num)
+    return scores
