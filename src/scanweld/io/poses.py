@@ -1,0 +1,162 @@
+"""Files of poses: scanweld's own JSON, and the flat ``{name: 4x4}`` of reference data."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+
+from scanweld.errors import ReadError
+from scanweld.geometry.pose import Pose
+from scanweld.io.atomic import write_whole
+from scanweld.io.matrices import pose_from_numbers
+from scanweld.io.names import natural_key
+
+FORMAT = 1
+CONVENTION = (
+    "x_world = M x_scan: each 4x4 matrix, row-major, maps homogeneous column vectors in the "
+    "coordinates of the scan's file to the frame of its component, in the unit of the file"
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PoseSet:
+    """Poses of scans by name.
+
+    Attributes:
+        poses: world_from_scan of every placed scan.
+        components: Names of the scans that share a frame; each placed scan is in exactly one.
+        unplaced: Name of a scan without a pose -> the reason.
+    """
+
+    poses: dict[str, Pose]
+    components: tuple[tuple[str, ...], ...]
+    unplaced: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        named = [name for component in self.components for name in component]
+        if len(set(named)) < len(named) or set(named) != set(self.poses):
+            raise ValueError("the components must name every placed scan, each once")
+        if both := sorted(set(self.poses) & set(self.unplaced), key=natural_key):
+            raise ValueError(f"{both[0]!r} has a pose and is named as unplaced")
+
+
+def read_poses(path: Path | str) -> PoseSet:
+    """Read poses in scanweld's format or as a flat ``{name: 4x4}``, taken as one component.
+
+    Raises:
+        ReadError: If the file is not such JSON, or a matrix is not a rigid motion.
+    """
+    path = Path(path)
+    content = _load(path)
+    try:
+        if "format" not in content:
+            poses = {name: _pose(name, rows) for name, rows in content.items()}
+            return PoseSet(poses=poses, components=(tuple(poses),) if poses else ())
+        if content["format"] != FORMAT:
+            raise ValueError(f"format {content['format']!r} is unknown, only {FORMAT} can be read")
+        return _own_format(content)
+    except ValueError as error:
+        raise ReadError(f"{path}: {error}; correct the file or write it anew") from error
+
+
+def write_poses(path: Path | str, pose_set: PoseSet) -> None:
+    """Write poses in scanweld's format: the same poses give the same bytes.
+
+    Raises:
+        WriteError: If the file cannot be written.
+    """
+    scans = {
+        name: pose_set.poses[name].matrix().tolist()
+        for name in sorted(pose_set.poses, key=natural_key)
+    }
+    unplaced = {
+        name: pose_set.unplaced[name] for name in sorted(pose_set.unplaced, key=natural_key)
+    }
+    entries = [
+        f'"format": {FORMAT}',
+        f'"convention": {_json(CONVENTION)}',
+        f'"scans": {_block("{}", [f"{_json(k)}: {_matrix(m)}" for k, m in scans.items()])}',
+        f'"components": {_block("[]", [_json(list(c)) for c in pose_set.components])}',
+        f'"unplaced": {_block("{}", [f"{_json(k)}: {_json(v)}" for k, v in unplaced.items()])}',
+    ]
+    text = "{\n " + ",\n ".join(entries) + "\n}\n"
+    write_whole(Path(path), text.encode("utf-8"))
+
+
+def _json(value: Any) -> str:  # noqa: ANN401
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _matrix(rows: list[list[float]]) -> str:
+    """A matrix with each row on a line of its own."""
+    return "[\n   " + ",\n   ".join(_json(row) for row in rows) + "\n  ]"
+
+
+def _block(brackets: str, items: list[str]) -> str:
+    if not items:
+        return brackets
+    return f"{brackets[0]}\n  " + ",\n  ".join(items) + f"\n {brackets[1]}"
+
+
+def _load(path: Path) -> dict[str, Any]:
+    """The JSON object in a file; NaN and keys that come twice are errors."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ReadError(f"{path}: cannot be read ({error}); check the path") from error
+    try:
+        content = json.loads(
+            text, object_pairs_hook=_without_repeats, parse_constant=_refuse_constant
+        )
+    except (ValueError, RecursionError) as error:
+        raise ReadError(f"{path}: not valid JSON ({error}); correct or replace it") from error
+    if not isinstance(content, dict):
+        raise ReadError(f"{path}: not a JSON object of poses by name; give a file of poses")
+    return content
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        repeated = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the key {repeated!r} comes twice")
+    return found
+
+
+def _refuse_constant(word: str) -> NoReturn:
+    raise ValueError(f"{word} is no number in JSON")
+
+
+def _own_format(content: dict[str, Any]) -> PoseSet:
+    scans, unplaced = content.get("scans"), content.get("unplaced", {})
+    if not isinstance(scans, dict) or not isinstance(unplaced, dict):
+        raise ValueError("'scans' and 'unplaced' must be JSON objects")
+    poses = {name: _pose(name, rows) for name, rows in scans.items()}
+    components = content.get("components", [list(poses)] if poses else [])
+    if not isinstance(components, list) or not all(_is_names(part) for part in components):
+        raise ValueError("'components' must be a list of lists of names")
+    return PoseSet(
+        poses=poses,
+        components=tuple(tuple(part) for part in components),
+        unplaced={name: str(reason) for name, reason in unplaced.items()},
+    )
+
+
+def _is_names(part: Any) -> bool:  # noqa: ANN401
+    return isinstance(part, list) and all(isinstance(name, str) for name in part)
+
+
+def _pose(name: str, rows: Any) -> Pose:  # noqa: ANN401
+    is_matrix = (
+        isinstance(rows, list)
+        and len(rows) == 4
+        and all(isinstance(row, list) and len(row) == 4 for row in rows)
+        and all(type(x) in (int, float) for row in rows for x in row)
+    )
+    if not is_matrix:
+        raise ValueError(f"{name!r} is not a 4x4 matrix of numbers")
+    try:
+        return pose_from_numbers([float(x) for row in rows for x in row])
+    except (ValueError, OverflowError) as error:
+        raise ValueError(f"{name!r}: {error}") from error
