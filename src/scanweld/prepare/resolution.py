@@ -1,0 +1,21 @@
+"""Point spacing of a scan."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from scanweld.geometry.arrays import FloatArray
+
+NUM_QUERIES = 2000
+"""Points whose nearest neighbour is looked up; the median of so many is good to 2 %."""
+
+
+def point_spacing(points: FloatArray) -> float:
+    """The median distance from a point of (N, 3) to its nearest distinct one, in their unit.
+
+    Exact duplicates do not count as neighbours. Zero if all points coincide.
+    """
+    queries = points[:: max(1, len(points) // NUM_QUERIES)]
+    distances = cKDTree(points).query(queries, k=min(4, len(points)))[0].reshape(len(queries), -1)
+    nearest = np.where(distances > 0, distances, np.inf).min(axis=1)
+    nearest = nearest[np.isfinite(nearest)]
+    return float(np.median(nearest)) if len(nearest) else 0.0

@@ -1,0 +1,109 @@
+"""On which side of the surface the sensor stood, where the line of sight is known.
+
+Each cue says how strongly it is for the sensor looking along +axis (1) or along -axis (-1).
+The first one, in the order below, that is strong enough decides; the others may contradict it,
+which is reported. If none is strong, the strongest decides and the side is called a guess.
+
+1. winding: counter-clockwise faces turn their front to the sensor.
+2. normals of the file turn towards the sensor.
+3. fall-off: surfaces curve away, so that depth grows towards the silhouette.
+
+How a grid fans out is better than all of these, and known before (``line_scanner``, ``camera_fit``).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.mesh import face_normals
+from scanweld.geometry.scan import RangeScan
+
+STRONG = 0.3
+"""Strength from which a cue decides."""
+MAX_PIXELS = 250
+"""Fall-off is measured on an image of at most so many pixels across."""
+RIM_PIXELS = 4
+"""Width of the rim along the silhouette on which fall-off is measured."""
+STEP_PIXELS = 3
+"""How far inside the rim the depth is that the rim's is compared with."""
+MAX_SLOPE = 4.0
+"""A depth step steeper than this is a jump, not a surface."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Side:
+    """Where the sensor looks: along +axis (sign 1) or -axis (sign -1), and how we know.
+
+    Attributes:
+        sign: 1 or -1.
+        cue: Name of the cue that decided.
+        strength: Of that cue, 0 to 1.
+        contradicts: Names of strong cues for the other side.
+    """
+
+    sign: int
+    cue: str
+    strength: float
+    contradicts: tuple[str, ...]
+
+    def note(self) -> str | None:
+        """What to tell the user about it, or None if nothing is in doubt."""
+        if self.strength < STRONG:
+            return f"the side on which the sensor stood is a guess (by {self.cue})"
+        if self.contradicts:
+            other = " and ".join(self.contradicts)
+            return f"the side on which the sensor stood is taken from {self.cue}; {other} contradict it"
+        return None
+
+
+def find_side(scan: RangeScan, axis: FloatArray, depth: FloatArray, pixel: float) -> Side:
+    """The side of a scan whose line of sight is axis (3,), up to its sign.
+
+    Args:
+        scan: Its faces and normals are looked at, if it has any.
+        axis: (3,) unit, scan frame.
+        depth: (H, W) image of the points' coordinates along the axis, NaN where there is none.
+        pixel: Size of the image's pixels on the object.
+    """
+    cues: list[tuple[str, float]] = []
+    if scan.faces is not None and len(scan.faces):
+        cues.append(("the faces' winding", -_balance(face_normals(scan.points, scan.faces) @ axis)))
+    if scan.normals is not None:
+        cues.append(("the normals", -_balance(scan.normals @ axis)))
+    cues.append(("depth falling off towards the silhouette", fall_off(depth, pixel)))
+    strong = [cue for cue in cues if abs(cue[1]) >= STRONG]
+    name, value = strong[0] if strong else max(cues, key=lambda cue: abs(cue[1]))
+    sign = -1 if value < 0 else 1
+    contradicts = tuple(other for other, v in strong if v * sign < 0)
+    return Side(sign=sign, cue=name, strength=abs(value), contradicts=contradicts)
+
+
+def fall_off(depth: FloatArray, pixel: float) -> float:
+    """How far depth (H, W) grows towards the silhouette: 1 everywhere, -1 if it shrinks everywhere.
+
+    Pixels on the outer rim are compared with those a few pixels further inside. Jumps and holes
+    have no say, slopes count up to 1.
+    """
+    stride = max(1, -(-max(depth.shape) // MAX_PIXELS))
+    margin = 2 * RIM_PIXELS
+    image = np.pad(depth[::stride, ::stride], margin, constant_values=np.nan)
+    seen = np.isfinite(image)
+    disk = ndimage.iterate_structure(ndimage.generate_binary_structure(2, 1), RIM_PIXELS)
+    inside = ndimage.binary_fill_holes(ndimage.binary_closing(seen, disk))
+    distance, nearest = ndimage.distance_transform_edt(inside, return_indices=True)
+    rows, columns = np.nonzero(seen & (distance <= RIM_PIXELS))
+    inward = np.stack([rows, columns]) - nearest[:, rows, columns]
+    inward = inward / np.linalg.norm(inward, axis=0)
+    deeper_rows, deeper_columns = np.rint([rows, columns] + STEP_PIXELS * inward).astype(int)
+    rise = image[rows, columns] - image[deeper_rows, deeper_columns]
+    slope = rise / (STEP_PIXELS * stride * pixel)
+    slope = slope[np.isfinite(slope) & (np.abs(slope) <= MAX_SLOPE)]
+    return _balance(np.clip(slope, -1, 1))
+
+
+def _balance(values: FloatArray) -> float:
+    """Sum of the values over the sum of their magnitudes; 0 if there are none."""
+    total = float(np.abs(values).sum())
+    return float(values.sum()) / total if total > 0 else 0.0
