@@ -83,7 +83,7 @@ def scene_of(
 def creature_scene(
     num_scans: int = 6,
     *,
-    pixels: float = 120.0,
+    pixels: float = 160.0,
     noise: NoiseModel | None = None,
     seed: int = 0,
     object_seed: int = 0,
@@ -92,7 +92,7 @@ def creature_scene(
     """Views at even steps around the creature, up and down by turns, each camera rolled at random.
 
     Args:
-        num_scans: Steps around the creature: 6 give overlaps of about 0.5 between neighbours.
+        num_scans: Steps around the creature: 6 give overlaps of 0.3 to 0.6 between neighbours.
         pixels: Pixels across the diameter of the creature.
         noise: Of the scanner; none if not given.
         seed: Of rolls, frames and noise.
@@ -118,7 +118,7 @@ def creature_scene(
 def pair_at_gap(
     gap_deg: float,
     *,
-    pixels: float = 150.0,
+    pixels: float = 180.0,
     noise: NoiseModel | None = None,
     seed: int = 0,
     azimuth_deg: float = 20.0,

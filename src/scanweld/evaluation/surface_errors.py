@@ -1,0 +1,114 @@
+"""How far a fused surface lies from a reference surface, and how much of it is there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.mesh import TriangleMesh, face_normals
+
+_NUM_NEAREST = 6
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SurfaceErrors:
+    """Distances between two surfaces, in their unit.
+
+    Attributes:
+        accuracy_median: Half of the model's surface lies closer to the reference than this,
+        accuracy_90: nine tenths of it,
+        accuracy_99: and 99 percent.
+        completeness: Share of the reference surface within the tolerance of the model.
+        tolerance: That tolerance.
+    """
+
+    accuracy_median: float
+    accuracy_90: float
+    accuracy_99: float
+    completeness: float
+    tolerance: float
+
+
+def surface_errors(
+    model: TriangleMesh,
+    reference: TriangleMesh,
+    tolerance: float,
+    *,
+    num_samples: int = 100_000,
+    seed: int = 0,
+) -> SurfaceErrors:
+    """Compare two surfaces in the same frame by samples spread evenly over their area.
+
+    Args:
+        model: The surface that is judged.
+        reference: The surface that is true.
+        tolerance: Distance up to which a point of the reference counts as covered.
+        num_samples: On each surface.
+        seed: Of the samples.
+    """
+    rng = np.random.default_rng(seed)
+    on_model, model_faces = sample_surface(model, num_samples, rng)
+    on_reference, reference_faces = sample_surface(reference, num_samples, rng)
+    accuracy = _distances(on_model, reference, on_reference, reference_faces)
+    coverage = _distances(on_reference, model, on_model, model_faces)
+    median, nine_tenths, most = np.percentile(accuracy, [50, 90, 99])
+    return SurfaceErrors(
+        accuracy_median=float(median),
+        accuracy_90=float(nine_tenths),
+        accuracy_99=float(most),
+        completeness=float(np.mean(coverage <= tolerance)),
+        tolerance=tolerance,
+    )
+
+
+def sample_surface(
+    mesh: TriangleMesh, num_samples: int, rng: np.random.Generator
+) -> tuple[FloatArray, IntArray]:
+    """Points (N, 3), spread evenly by area, and the faces (N,) that they lie on."""
+    areas = np.linalg.norm(face_normals(mesh.vertices, mesh.faces), axis=1)
+    steps = (np.arange(num_samples) + rng.random(num_samples)) / num_samples
+    face_of = np.searchsorted(np.cumsum(areas), steps * areas.sum(), side="right")
+    face_of = np.minimum(face_of, len(areas) - 1)
+    u, v = rng.random((2, num_samples))
+    folded = u + v > 1
+    u, v = np.where(folded, 1 - u, u), np.where(folded, 1 - v, v)
+    a, b, c = (mesh.vertices[mesh.faces[face_of, k]] for k in range(3))
+    return a + u[:, None] * (b - a) + v[:, None] * (c - a), face_of
+
+
+def _distances(
+    points: FloatArray, mesh: TriangleMesh, samples: FloatArray, face_of: IntArray
+) -> FloatArray:
+    """Distances (N,) of points from the triangles nearest by.
+
+    Large triangles are found by the samples on them, small ones by their middles.
+    """
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    marks = np.concatenate([samples, middles])
+    mark_faces = np.concatenate([face_of, np.arange(len(mesh.faces))])
+    _, nearest = KDTree(marks).query(points, k=_NUM_NEAREST)
+    candidates = mark_faces[np.asarray(nearest)]
+    best = np.full(len(points), np.inf)
+    for k in range(_NUM_NEAREST):
+        triangles = mesh.vertices[mesh.faces[candidates[:, k]]]
+        best = np.minimum(best, distance_to_triangles(points, triangles))
+    return best
+
+
+def distance_to_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Distance (N,) of each point (N, 3) from its own triangle (N, 3 corners, 3)."""
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    best = np.full(len(points), np.inf)
+    inside = length > 0
+    for k in range(3):
+        a, b = triangles[:, k], triangles[:, (k + 1) % 3]
+        along = b - a
+        length2 = np.maximum(np.einsum("nk,nk->n", along, along), np.finfo(float).tiny)
+        t = np.clip(np.einsum("nk,nk->n", points - a, along) / length2, 0, 1)
+        best = np.minimum(best, np.linalg.norm(points - a - t[:, None] * along, axis=1))
+        inside &= np.einsum("nk,nk->n", np.cross(along, points - a), normal) >= 0
+    unit = normal / np.maximum(length, np.finfo(float).tiny)[:, None]
+    height = np.abs(np.einsum("nk,nk->n", points - triangles[:, 0], unit))
+    return np.where(inside, height, best)

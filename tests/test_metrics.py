@@ -1,0 +1,175 @@
+"""Pose and surface errors: gauges, components, invariances."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scanweld.errors import InputError
+from scanweld.evaluation.metrics import (
+    Standing,
+    evaluate_poses,
+    object_diameter,
+    scan_centroids,
+)
+from scanweld.evaluation.primitives import sphere
+from scanweld.evaluation.surface_errors import distance_to_triangles, surface_errors
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from tests.scenes import creature_scene, random_motion
+
+NAMES = tuple("abcdef")
+
+
+def reference_poses(seed: int = 0) -> dict[str, Pose]:
+    rng = np.random.default_rng(seed)
+    return {name: random_motion(rng, 10.0) for name in NAMES}
+
+
+def turned(degrees: float) -> Pose:
+    return Pose.exp([0.0, 0.0, np.radians(degrees), 0.0, 0.0, 0.0])
+
+
+def shifted(length: float) -> Pose:
+    return Pose(rotation=np.eye(3), translation=np.array([0.0, length, 0.0]))
+
+
+def test_the_truth_is_right_in_any_frame():
+    reference = reference_poses()
+    motion = random_motion(np.random.default_rng(5), 100.0)
+    moved = {name: motion @ pose for name, pose in reference.items()}
+    errors = evaluate_poses(moved, [NAMES], reference, diameter=1.0)
+    assert errors.count(Standing.RIGHT) == len(NAMES)
+    assert errors.rotations_deg.max() < 1e-5
+    assert errors.translations.max() < 1e-9
+
+
+def test_the_gauge_is_not_the_odd_one_out():
+    """Scan a, first of all, is turned by 20 degrees: it alone is wrong, by those 20 degrees."""
+    reference = reference_poses()
+    estimate = {**reference, "a": reference["a"] @ turned(20)}
+    errors = evaluate_poses(estimate, [NAMES], reference, diameter=1.0)
+    assert errors.scans["a"].standing is Standing.WRONG
+    assert errors.scans["a"].rotation_deg == pytest.approx(20)
+    assert errors.count(Standing.RIGHT) == len(NAMES) - 1
+
+
+def test_ties_go_to_the_gauge_with_the_smallest_mean_error():
+    """Turns of 0, 1 and 2 degrees about one axis: the gauge is the middle one."""
+    reference = {name: Pose.identity() for name in "abc"}
+    estimate = {"a": turned(0), "b": turned(1), "c": turned(2)}
+    errors = evaluate_poses(estimate, ["abc"], reference, diameter=1.0)
+    assert errors.rotations_deg == pytest.approx([1, 0, 1], abs=1e-9)
+
+
+def test_each_component_has_its_own_gauge():
+    reference = reference_poses()
+    rng = np.random.default_rng(1)
+    estimate: dict[str, Pose] = {}
+    for group in (NAMES[:3], NAMES[3:]):
+        motion = random_motion(rng, 50.0)
+        estimate.update({name: motion @ reference[name] for name in group})
+    apart = evaluate_poses(estimate, [NAMES[:3], NAMES[3:]], reference, diameter=1.0)
+    assert apart.count(Standing.RIGHT) == 6
+    together = evaluate_poses(estimate, [NAMES], reference, diameter=1.0)
+    assert together.count(Standing.WRONG) == 3
+
+
+def test_unplaced_and_foreign_scans():
+    reference = reference_poses()
+    estimate = {"a": reference["a"], "b": reference["b"], "stranger": Pose.identity()}
+    errors = evaluate_poses(estimate, [("a", "b", "stranger")], reference, diameter=1.0)
+    assert errors.scans["stranger"].standing is Standing.WRONG
+    assert errors.count(Standing.UNPLACED) == 4
+    assert len(errors.rotations_deg) == 2
+
+
+def test_nothing_placed():
+    errors = evaluate_poses({}, [], reference_poses(), diameter=1.0)
+    assert errors.count(Standing.UNPLACED) == len(NAMES)
+    assert errors.translations_percent.size == 0
+
+
+def test_other_names_are_an_error():
+    with pytest.raises(InputError, match="share no scan name"):
+        evaluate_poses({"x": Pose.identity()}, [("x",)], reference_poses())
+
+
+@pytest.mark.parametrize(
+    ("shift", "standing"), [(1.4, Standing.RIGHT), (1.6, Standing.WRONG)], ids=["below", "above"]
+)
+def test_a_shift_is_judged_in_percent_of_the_diameter(shift: float, standing: Standing):
+    reference = {name: Pose.identity() for name in "abc"}
+    estimate = {**reference, "c": shifted(shift)}
+    errors = evaluate_poses(estimate, ["abc"], reference, diameter=100.0)
+    assert errors.scans["c"].standing is standing
+    assert errors.scans["c"].translation == pytest.approx(shift)
+    assert errors.translations_percent.max() == pytest.approx(shift)
+
+
+def test_translation_is_taken_at_the_centroid():
+    """A turn about the centroid moves it nowhere, wherever the frame's origin is."""
+    centroid = np.array([100.0, 50.0, 0.0])
+    about = Pose(rotation=np.eye(3), translation=centroid)
+    reference = {name: Pose.identity() for name in "abc"}
+    estimate = {**reference, "c": about @ turned(2) @ about.inverse()}
+    centroids = {name: centroid for name in "abc"}
+    errors = evaluate_poses(estimate, ["abc"], reference, centroids=centroids, diameter=10.0)
+    assert errors.scans["c"].translation < 1e-9
+    at_origin = evaluate_poses(estimate, ["abc"], reference)
+    assert at_origin.scans["c"].translation > 3
+    assert at_origin.scans["c"].standing is Standing.RIGHT
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 1000))
+def test_errors_do_not_depend_on_frames(seed: int):
+    """Moving the estimate, the reference, or a scan's file with its centroid changes nothing."""
+    rng = np.random.default_rng(seed)
+    reference = reference_poses(seed)
+    centroids = {name: rng.normal(size=3) for name in NAMES}
+    estimate = {k: p @ Pose.exp(0.02 * rng.normal(size=6)) for k, p in reference.items()}
+    before = evaluate_poses(estimate, [NAMES], reference, centroids=centroids, diameter=3.0)
+    world, truth = random_motion(rng, 9.0), random_motion(rng, 9.0)
+    files = {name: random_motion(rng, 9.0) for name in NAMES}
+    after = evaluate_poses(
+        {k: world @ p @ files[k].inverse() for k, p in estimate.items()},
+        [NAMES],
+        {k: truth @ p @ files[k].inverse() for k, p in reference.items()},
+        centroids={k: files[k].apply(c) for k, c in centroids.items()},
+        diameter=3.0,
+    )
+    np.testing.assert_allclose(after.rotations_deg, before.rotations_deg, atol=1e-5)
+    np.testing.assert_allclose(after.translations, before.translations, atol=1e-9)
+    assert [e.standing for e in after.scans.values()] == [e.standing for e in before.scans.values()]
+
+
+def test_diameter_and_centroids_of_a_scene():
+    scene = creature_scene(4, pixels=60)
+    diameter = object_diameter(scene.scans, scene.world_from_scan)
+    extent = np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0))
+    assert 0.8 * extent < diameter < 1.1 * extent
+    for name, centroid in scan_centroids(scene.scans).items():
+        world = scene.world_from_scan[name].apply(centroid)
+        assert (world > scene.mesh.vertices.min(axis=0)).all()
+        assert (world < scene.mesh.vertices.max(axis=0)).all()
+
+
+def test_surface_errors_of_concentric_balls():
+    """Radii 50 and 51: every point is 1 away, and half the ball covers half of it."""
+    inner, outer = sphere(50.0), sphere(51.0)
+    errors = surface_errors(outer, inner, tolerance=1.1, num_samples=20_000)
+    assert errors.accuracy_median == pytest.approx(1.0, abs=0.03)
+    assert errors.accuracy_99 == pytest.approx(1.0, abs=0.06)
+    assert errors.completeness == 1.0
+    upper = inner.vertices[inner.faces].mean(axis=1)[:, 2] > 0
+    half = TriangleMesh(vertices=inner.vertices, faces=inner.faces[upper])
+    assert surface_errors(half, inner, 0.5).completeness == pytest.approx(0.5, abs=0.02)
+    assert surface_errors(inner, half, 0.5).accuracy_90 > 10
+
+
+def test_distance_to_a_triangle_by_its_regions():
+    triangle = np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 0]])
+    points = np.array([[1.0, 1, 2], [2, -3, 0], [-3, -4, 0], [4, 3, 0], [1, 0, 0]])
+    distances = distance_to_triangles(points, np.repeat(triangle[None], len(points), axis=0))
+    np.testing.assert_allclose(distances, [2, 3, 5, 2.4, 0], atol=1e-12)
