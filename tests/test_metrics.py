@@ -1,5 +1,7 @@
 """Pose and surface errors: gauges, components, invariances."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,6 +18,7 @@ from scanweld.evaluation.primitives import sphere
 from scanweld.evaluation.surface_errors import distance_to_triangles, surface_errors
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
+from scanweld.io.poses import PoseSet
 from tests.scenes import creature_scene, random_motion
 
 NAMES = tuple("abcdef")
@@ -24,6 +27,10 @@ NAMES = tuple("abcdef")
 def reference_poses(seed: int = 0) -> dict[str, Pose]:
     rng = np.random.default_rng(seed)
     return {name: random_motion(rng, 10.0) for name in NAMES}
+
+
+def in_parts(poses: dict[str, Pose], *components: Sequence[str]) -> PoseSet:
+    return PoseSet(poses=poses, components=tuple(tuple(part) for part in components))
 
 
 def turned(degrees: float) -> Pose:
@@ -38,7 +45,7 @@ def test_the_truth_is_right_in_any_frame():
     reference = reference_poses()
     motion = random_motion(np.random.default_rng(5), 100.0)
     moved = {name: motion @ pose for name, pose in reference.items()}
-    errors = evaluate_poses(moved, [NAMES], reference, diameter=1.0)
+    errors = evaluate_poses(in_parts(moved, NAMES), reference, diameter=1.0)
     assert errors.count(Standing.RIGHT) == len(NAMES)
     assert errors.rotations_deg.max() < 1e-5
     assert errors.translations.max() < 1e-9
@@ -48,7 +55,7 @@ def test_the_gauge_is_not_the_odd_one_out():
     """Scan a, first of all, is turned by 20 degrees: it alone is wrong, by those 20 degrees."""
     reference = reference_poses()
     estimate = {**reference, "a": reference["a"] @ turned(20)}
-    errors = evaluate_poses(estimate, [NAMES], reference, diameter=1.0)
+    errors = evaluate_poses(in_parts(estimate, NAMES), reference, diameter=1.0)
     assert errors.scans["a"].standing is Standing.WRONG
     assert errors.scans["a"].rotation_deg == pytest.approx(20)
     assert errors.count(Standing.RIGHT) == len(NAMES) - 1
@@ -58,7 +65,7 @@ def test_ties_go_to_the_gauge_with_the_smallest_mean_error():
     """Turns of 0, 1 and 2 degrees about one axis: the gauge is the middle one."""
     reference = {name: Pose.identity() for name in "abc"}
     estimate = {"a": turned(0), "b": turned(1), "c": turned(2)}
-    errors = evaluate_poses(estimate, ["abc"], reference, diameter=1.0)
+    errors = evaluate_poses(in_parts(estimate, "abc"), reference, diameter=1.0)
     assert errors.rotations_deg == pytest.approx([1, 0, 1], abs=1e-9)
 
 
@@ -69,30 +76,30 @@ def test_each_component_has_its_own_gauge():
     for group in (NAMES[:3], NAMES[3:]):
         motion = random_motion(rng, 50.0)
         estimate.update({name: motion @ reference[name] for name in group})
-    apart = evaluate_poses(estimate, [NAMES[:3], NAMES[3:]], reference, diameter=1.0)
+    apart = evaluate_poses(in_parts(estimate, NAMES[:3], NAMES[3:]), reference, diameter=1.0)
     assert apart.count(Standing.RIGHT) == 6
-    together = evaluate_poses(estimate, [NAMES], reference, diameter=1.0)
+    together = evaluate_poses(in_parts(estimate, NAMES), reference, diameter=1.0)
     assert together.count(Standing.WRONG) == 3
 
 
 def test_unplaced_and_foreign_scans():
     reference = reference_poses()
     estimate = {"a": reference["a"], "b": reference["b"], "stranger": Pose.identity()}
-    errors = evaluate_poses(estimate, [("a", "b", "stranger")], reference, diameter=1.0)
+    errors = evaluate_poses(in_parts(estimate, tuple(estimate)), reference, diameter=1.0)
     assert errors.scans["stranger"].standing is Standing.WRONG
     assert errors.count(Standing.UNPLACED) == 4
     assert len(errors.rotations_deg) == 2
 
 
 def test_nothing_placed():
-    errors = evaluate_poses({}, [], reference_poses(), diameter=1.0)
+    errors = evaluate_poses(in_parts({}), reference_poses(), diameter=1.0)
     assert errors.count(Standing.UNPLACED) == len(NAMES)
     assert errors.translations_percent.size == 0
 
 
 def test_other_names_are_an_error():
     with pytest.raises(InputError, match="share no scan name"):
-        evaluate_poses({"x": Pose.identity()}, [("x",)], reference_poses())
+        evaluate_poses(in_parts({"x": Pose.identity()}, "x"), reference_poses())
 
 
 @pytest.mark.parametrize(
@@ -101,7 +108,7 @@ def test_other_names_are_an_error():
 def test_a_shift_is_judged_in_percent_of_the_diameter(shift: float, standing: Standing):
     reference = {name: Pose.identity() for name in "abc"}
     estimate = {**reference, "c": shifted(shift)}
-    errors = evaluate_poses(estimate, ["abc"], reference, diameter=100.0)
+    errors = evaluate_poses(in_parts(estimate, "abc"), reference, diameter=100.0)
     assert errors.scans["c"].standing is standing
     assert errors.scans["c"].translation == pytest.approx(shift)
     assert errors.translations_percent.max() == pytest.approx(shift)
@@ -114,9 +121,11 @@ def test_translation_is_taken_at_the_centroid():
     reference = {name: Pose.identity() for name in "abc"}
     estimate = {**reference, "c": about @ turned(2) @ about.inverse()}
     centroids = {name: centroid for name in "abc"}
-    errors = evaluate_poses(estimate, ["abc"], reference, centroids=centroids, diameter=10.0)
+    errors = evaluate_poses(
+        in_parts(estimate, "abc"), reference, centroids=centroids, diameter=10.0
+    )
     assert errors.scans["c"].translation < 1e-9
-    at_origin = evaluate_poses(estimate, ["abc"], reference)
+    at_origin = evaluate_poses(in_parts(estimate, "abc"), reference)
     assert at_origin.scans["c"].translation > 3
     assert at_origin.scans["c"].standing is Standing.RIGHT
 
@@ -129,12 +138,11 @@ def test_errors_do_not_depend_on_frames(seed: int):
     reference = reference_poses(seed)
     centroids = {name: rng.normal(size=3) for name in NAMES}
     estimate = {k: p @ Pose.exp(0.02 * rng.normal(size=6)) for k, p in reference.items()}
-    before = evaluate_poses(estimate, [NAMES], reference, centroids=centroids, diameter=3.0)
+    before = evaluate_poses(in_parts(estimate, NAMES), reference, centroids=centroids, diameter=3.0)
     world, truth = random_motion(rng, 9.0), random_motion(rng, 9.0)
     files = {name: random_motion(rng, 9.0) for name in NAMES}
     after = evaluate_poses(
-        {k: world @ p @ files[k].inverse() for k, p in estimate.items()},
-        [NAMES],
+        in_parts({k: world @ p @ files[k].inverse() for k, p in estimate.items()}, NAMES),
         {k: truth @ p @ files[k].inverse() for k, p in reference.items()},
         centroids={k: files[k].apply(c) for k, c in centroids.items()},
         diameter=3.0,

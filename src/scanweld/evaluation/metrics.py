@@ -1,6 +1,6 @@
 """Pose errors against a reference, and which scans are right, wrong or unplaced."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -10,6 +10,7 @@ from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.io.poses import PoseSet
 
 MAX_ROTATION_DEG = 3.0
 """A scan turned by more than this is wrong."""
@@ -79,8 +80,7 @@ class PoseErrors:
 
 
 def evaluate_poses(
-    poses: Mapping[str, Pose],
-    components: Sequence[Sequence[str]],
+    estimate: PoseSet,
     reference: Mapping[str, Pose],
     *,
     centroids: Mapping[str, FloatArray] | None = None,
@@ -94,8 +94,7 @@ def evaluate_poses(
     (rotation and translation as shares of what is still right).
 
     Args:
-        poses: world_from_scan of the placed scans.
-        components: Names of the scans that share a frame.
+        estimate: Poses of the placed scans, each component in a frame of its own.
         reference: world_from_scan that poses are held against. A placed scan without one (of
             another object, say) counts as wrong.
         centroids: Point (3,) of each scan, scan frame, where its translation is taken.
@@ -104,13 +103,14 @@ def evaluate_poses(
     Raises:
         InputError: If the two have no scan in common.
     """
+    poses = estimate.poses
     if poses and not set(poses) & set(reference):
         raise InputError(
             f"the estimate and the reference share no scan name (such as '{min(poses)}' and "
             f"'{min(reference, default='none')}'): compare poses of the same files"
         )
     errors = {name: ScanError(standing=Standing.UNPLACED) for name in sorted(reference)}
-    for component in components:
+    for component in estimate.components:
         placed = {name: poses[name] for name in component}
         known = [name for name in component if name in reference]
         errors.update({name: ScanError(standing=Standing.WRONG) for name in component})
