@@ -1,0 +1,61 @@
+"""The project's own objects are closed, in one piece, and the same each time."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import KDTree
+
+from scanweld.evaluation.creature import creature
+from scanweld.geometry.mesh import TriangleMesh
+from tests.scenes import PRIMITIVES, small_creature
+
+
+def as_trimesh(mesh: TriangleMesh) -> trimesh.Trimesh:
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_creature_is_one_closed_body(seed: int):
+    mesh = as_trimesh(small_creature(seed))
+    assert mesh.is_watertight
+    assert mesh.body_count == 1
+    assert mesh.volume > 0
+    assert 5_000 < len(mesh.faces) < 20_000
+
+
+def test_the_full_creature_has_enough_faces():
+    mesh = creature()
+    assert 50_000 < len(mesh.faces) < 100_000
+    assert as_trimesh(mesh).is_watertight
+    assert mesh.colors is not None
+    assert mesh.colors.std(axis=0).min() > 10
+
+
+def test_a_creature_is_the_same_each_time():
+    first, again = creature(3, voxels=60), creature(3, voxels=60)
+    assert first.vertices.tobytes() == again.vertices.tobytes()
+    assert first.faces.tobytes() == again.faces.tobytes()
+
+
+def test_seeds_give_different_creatures():
+    volumes = [as_trimesh(small_creature(seed)).volume for seed in range(4)]
+    assert np.diff(np.sort(volumes)).min() > 0.001 * max(volumes)
+
+
+def test_a_creature_has_no_symmetry():
+    """Its mirror image and its half turns about the axes leave much of it uncovered."""
+    mesh = as_trimesh(small_creature())
+    points = mesh.sample(4000, seed=0)
+    centred = points - mesh.center_mass
+    axes = np.linalg.eigh(np.cov(centred.T))[1]
+    tree = KDTree(centred @ axes)
+    for signs in ([1, -1, -1], [-1, 1, -1], [-1, -1, 1], [-1, 1, 1], [1, -1, 1], [1, 1, -1]):
+        distance, _ = tree.query((centred @ axes) * signs)
+        assert np.percentile(distance, 75) > 5
+
+
+def test_plain_objects_are_closed():
+    for make in PRIMITIVES.values():
+        mesh = as_trimesh(make())
+        assert mesh.is_watertight
+        assert mesh.volume > 0

@@ -1,0 +1,98 @@
+"""Simulated folders: what is in them, and that the truth is true."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from scanweld.errors import InputError, WriteError
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.simulate import simulate, views_around
+from scanweld.evaluation.surface_errors import sample_surface
+from scanweld.evaluation.views import overlaps
+from scanweld.geometry.camera import CameraModel
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.scan import Viewpoint
+from scanweld.io.collect import collect
+from scanweld.io.poses import read_poses
+from scanweld.io.read import read_scan
+from tests.scenes import small_creature
+
+CLEAN = NoiseModel()
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("model", [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC])
+def test_the_truth_puts_the_scans_on_the_mesh(tmp_path: Path, model: CameraModel):
+    mesh = small_creature()
+    truth = simulate(mesh, tmp_path, num_scans=5, pixels=80, noise=CLEAN, model=model)
+    tree = KDTree(sample_surface(mesh, 100_000, np.random.default_rng(0))[0])
+    files = collect([tmp_path])
+    assert [file.name for file in files] == [f"scan_{k:02d}" for k in range(1, 6)]
+    for file in files:
+        scan = read_scan(file.path, file.name)
+        distance, _ = tree.query(truth.poses[file.name].apply(scan.points))
+        assert np.max(distance) < 1.5
+        assert scan.viewpoint is Viewpoint.GIVEN
+        assert scan.grid is not None and scan.camera is not None
+        assert scan.camera.model is model
+
+
+def test_the_truth_is_written_beside_the_scans(tmp_path: Path):
+    truth = simulate(small_creature(), tmp_path, num_scans=3, pixels=60)
+    written = read_poses(tmp_path / "truth" / "poses.json")
+    assert written.components == truth.components
+    for name, pose in truth.poses.items():
+        np.testing.assert_array_equal(written.poses[name].matrix(), pose.matrix())
+
+
+def test_same_seed_same_files(tmp_path: Path):
+    for name, seed in (("a", 4), ("b", 4), ("c", 5)):
+        simulate(small_creature(), tmp_path / name, num_scans=3, pixels=60, seed=seed)
+    first, again, other = (files_of(tmp_path / name) for name in "abc")
+    assert first == again
+    assert not set(first.values()) & set(other.values())
+
+
+def test_names_say_nothing_about_the_views(tmp_path: Path):
+    """Numbered in the order of the views, azimuths would rise."""
+    truth = simulate(small_creature(), tmp_path, num_scans=7, pixels=60, seed=1)
+    azimuths = []
+    for name in sorted(truth.poses):
+        scan = read_scan(tmp_path / f"{name}.ply")
+        assert scan.scan_from_sensor is not None
+        x, y, _ = (truth.poses[name] @ scan.scan_from_sensor).translation
+        azimuths.append(np.degrees(np.arctan2(y, x)) % 360)
+    assert (np.diff(azimuths) < 0).sum() > 1
+
+
+@pytest.mark.parametrize("num_scans", [8, 10, 12])
+def test_neighbouring_views_overlap(num_scans: int):
+    """Every view has another that it shares a third with, and these join all of them."""
+    mesh = small_creature()
+    views = views_around(mesh, num_scans, np.random.default_rng(0), pixels=80)
+    joined = np.linalg.matrix_power((overlaps(mesh, views) > 0.3).astype(int), num_scans) > 0
+    assert joined.all()
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(WriteError, match="not empty"):
+        simulate(small_creature(), tmp_path, num_scans=2, pixels=60)
+    assert list(files_of(tmp_path)) == ["notes.txt"]
+
+
+def test_nothing_to_scan_is_an_error(tmp_path: Path):
+    with pytest.raises(InputError, match="2 or more"):
+        simulate(small_creature(), tmp_path, num_scans=1)
+    cloud = TriangleMesh(vertices=np.eye(3), faces=np.empty((0, 3), dtype=np.int64))
+    with pytest.raises(InputError, match="no faces"):
+        simulate(cloud, tmp_path)
