@@ -1,5 +1,6 @@
 """Writing a file whole or not at all."""
 
+import contextlib
 import os
 import threading
 from pathlib import Path
@@ -18,8 +19,8 @@ def write_whole(path: Path, data: bytes) -> None:
         temporary.write_bytes(data)
         temporary.replace(path)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
         raise WriteError(
             f"{path}: cannot be written ({error.strerror}); check the folder and its permissions"
         ) from error
-    finally:
-        temporary.unlink(missing_ok=True)

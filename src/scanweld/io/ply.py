@@ -102,13 +102,14 @@ def _column_bytes(path: Path, element: PlyElement, columns: Columns, name: str) 
     return None if found is None else found[:, 0]
 
 
-def _index_list(columns: Columns) -> tuple[IntArray, IntArray] | None:
+def _index_list(path: Path, columns: Columns) -> tuple[IntArray, IntArray] | None:
     """Lengths and values of the element's list of vertex indices."""
-    for name in _INDEX_LISTS:
-        column = columns.get(name)
-        if isinstance(column, Ragged):
-            return column.counts, column.values.astype(np.int64)
-    return None
+    column = next((columns[name] for name in _INDEX_LISTS if name in columns), None)
+    if not isinstance(column, Ragged):
+        return None
+    if column.values.dtype.kind == "f" and not np.equal(column.values % 1, 0).all():
+        raise ReadError(f"{path}: a vertex index is not a whole number; export the file anew")
+    return column.counts, column.values.astype(np.int64)
 
 
 def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | None, tuple[str, ...]]:
@@ -116,7 +117,7 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
     element = header.element("range_grid")
     if element is None or element.count == 0:
         return None, ()
-    cells = _index_list(tables["range_grid"])
+    cells = _index_list(header.path, tables["range_grid"])
     if cells is None:
         raise ReadError(f"{header.path}: its range_grid has no list vertex_indices; export it anew")
     shape = (header.info.get("num_rows", ""), header.info.get("num_cols", ""))
@@ -140,7 +141,7 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
 
 
 def _faces(header: PlyHeader, tables: dict[str, Columns]) -> IntArray | None:
-    polygons = _index_list(tables.get("face", {}))
+    polygons = _index_list(header.path, tables.get("face", {}))
     return None if polygons is None else fan_triangles(*polygons)
 
 
@@ -149,8 +150,8 @@ def _camera(header: PlyHeader) -> Camera | None:
     text = header.info.get(CAMERA_KEY)
     if text is None:
         return None
-    model, *numbers = text.split()
     try:
+        model, *numbers = text.split()
         width, height = (int(word) for word in numbers[:2])
         fx, fy, cx, cy = (float(word) for word in numbers[2:])
         return Camera(

@@ -1,6 +1,7 @@
 """The header of a PLY file: which elements its body holds, in which types and order."""
 
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,7 @@ SCALAR_TYPES = {
     **{"int64": "i8", "uint64": "u8", "float": "f4", "double": "f8"},
     **{"float32": "f4", "float64": "f8"},
 }
+_FIRST_LINE = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
 FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 
 
@@ -80,14 +82,13 @@ def parse_header(path: Path, data: bytes) -> PlyHeader:
     comments: list[str] = []
     elements: list[tuple[str, int, list[PlyProperty]]] = []
     for line in lines:
-        keyword, _, rest = line.strip().partition(" ")
-        words = rest.split()
+        keyword, *words = line.split() or [""]
         if keyword == "format":
             form = words[0] if words else None
         elif keyword == "obj_info":
             info[words[0] if words else ""] = " ".join(words[1:])
         elif keyword == "comment":
-            comments.append(rest)
+            comments.append(line.removeprefix("comment").strip())
         elif keyword == "element":
             elements.append(_element(path, line, words))
         elif keyword == "property":
@@ -117,19 +118,20 @@ def _header_lines(path: Path, data: bytes) -> tuple[list[str], int]:
     """The lines between ``ply`` and ``end_header``, and where the body begins."""
     if not data:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
-    # The first line tells the line ending; searching on would misread binary bodies.
-    newline = next((n for n in (b"\r\n", b"\n", b"\r") if data.startswith(b"ply" + n)), None)
-    if newline is None:
+    # The first line tells the line ending: the first bytes of a binary body may look like one.
+    first = _FIRST_LINE.match(data)
+    if first is None:
         raise ReadError(f"{path}: not a PLY file (it does not begin with 'ply'); leave it out")
+    newline = b"\r" if first[1] == b"\r" else b"\n"
     end = data.find(newline + b"end_header")
     if end < 0:
         raise ReadError(
             f"{path}: the header has no 'end_header', the file is cut off; copy it again"
         )
-    after = data.find(newline, end + len(newline))
-    body_start = len(data) if after < 0 else after + len(newline)
-    text = data[:end].decode("utf-8", errors="replace")
-    return text.split(newline.decode())[1:], body_start
+    after = data.find(newline, end + 1)
+    body_start = len(data) if after < 0 else after + 1
+    text = data[first.end() : max(first.end(), end)].decode("utf-8", errors="replace")
+    return [line.strip() for line in text.split(newline.decode())], body_start
 
 
 def _element(path: Path, line: str, words: list[str]) -> tuple[str, int, list[PlyProperty]]:

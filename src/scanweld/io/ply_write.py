@@ -86,9 +86,12 @@ def _lossless(values: NDArray) -> NDArray:
 
 def _scalar_element(name: str, fields: dict[str, NDArray]) -> tuple[list[str], bytes]:
     """Header lines and body of an element without lists."""
-    table = np.rec.fromarrays(list(fields.values()), names=",".join(fields))
-    header = [f"element {name} {len(table)}"]
-    header += [f"property {_TYPE_NAMES[f.dtype.str]} {key}" for key, f in fields.items()]
+    num_rows = len(next(iter(fields.values())))
+    table = np.zeros(num_rows, dtype=[(key, column.dtype) for key, column in fields.items()])
+    for key, column in fields.items():
+        table[key] = column
+    header = [f"element {name} {num_rows}"]
+    header += [f"property {_TYPE_NAMES[c.dtype.str]} {key}" for key, c in fields.items()]
     return header, table.tobytes()
 
 

@@ -83,7 +83,7 @@ def write_poses(path: Path | str, pose_set: PoseSet) -> None:
     write_whole(Path(path), text.encode("utf-8"))
 
 
-def _json(value: Any) -> str:  # noqa: ANN401
+def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
@@ -143,11 +143,11 @@ def _own_format(content: dict[str, Any]) -> PoseSet:
     )
 
 
-def _is_names(part: Any) -> bool:  # noqa: ANN401
+def _is_names(part: Any) -> bool:
     return isinstance(part, list) and all(isinstance(name, str) for name in part)
 
 
-def _pose(name: str, rows: Any) -> Pose:  # noqa: ANN401
+def _pose(name: str, rows: Any) -> Pose:
     is_matrix = (
         isinstance(rows, list)
         and len(rows) == 4

@@ -6,12 +6,17 @@ from pathlib import Path
 from scanweld.errors import ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
+from scanweld.io.mesh_formats import read_obj, read_off, read_stl
 from scanweld.io.ply import read_ply
 from scanweld.io.raw import RawScan, to_mesh, to_scan
+from scanweld.io.xyz import read_xyz
 
 Reader = Callable[[Path, bytes], RawScan]
 
-READERS: dict[str, Reader] = {".ply": read_ply}
+READERS: dict[str, Reader] = {
+    **{".ply": read_ply, ".obj": read_obj, ".off": read_off, ".stl": read_stl},
+    **dict.fromkeys((".xyz", ".pts", ".asc", ".txt", ".csv"), read_xyz),
+}
 """Suffix in lower case -> reader."""
 
 
@@ -19,7 +24,7 @@ def read_scan(path: Path | str, name: str | None = None) -> RangeScan:
     """Read a file as one scan, in the coordinates and the unit of the file.
 
     Args:
-        path: PLY.
+        path: A PLY file, a mesh (OBJ, OFF, STL) or text (XYZ, PTS, ASC, TXT, CSV).
         name: The scan's name; the file's stem if not given.
 
     Raises:

@@ -34,6 +34,15 @@ def parse_numbers(path: Path, text: bytes, first_line: int = 1) -> FloatArray:
         return np.array([_number(path, word, number) for word, number in words], dtype=np.float64)
 
 
+def is_number(word: bytes) -> bool:
+    """Whether a word can be read as a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 def _number(path: Path, word: bytes, line_number: int) -> float:
     try:
         return float(word)
