@@ -1,11 +1,133 @@
 """Shaded pictures of meshes, for looking at results and for the documentation."""
 
+import struct
+import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from imageio.v3 import imwrite
+from numpy.typing import ArrayLike
 
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
-from scanweld.geometry.mesh import TriangleMesh, face_normals, vertex_normals
+from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.rasterize import render_depth
+
+_PAPER = np.array([255.0, 255.0, 255.0])
+_FRONT = np.array([205.0, 205.0, 200.0])
+_BACK = np.array([120.0, 140.0, 190.0])
+_AMBIENT = 0.15
+_MARGIN = 0.03
+_OVERSAMPLING = 2
+
+
+def render_shaded(
+    mesh: TriangleMesh,
+    direction: ArrayLike,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+    size: int = 600,
+    *,
+    smooth: bool = True,
+) -> ByteArray:
+    """A mesh under a headlight, seen orthographically and filling the picture.
+
+    Colours are the mesh's own, else grey; faces seen from behind are blue.
+
+    Args:
+        mesh: With at least one face.
+        direction: (3,) from the object to the viewer, of any length.
+        up: (3,) what is up in the picture; must not be parallel to the direction.
+        size: Pixels along the longer side of the picture.
+        smooth: Shade by the vertices' normals, where there are any, rather than by the faces'.
+
+    Returns:
+        (H, W, 3) picture on white.
+    """
+    picture_from_world = _looking_from(np.asarray(direction, float), np.asarray(up, float))
+    points = picture_from_world.apply(mesh.vertices)
+    camera = _camera_around(points[np.unique(mesh.faces)], size * _OVERSAMPLING)
+    depth, face_of = render_depth(points, mesh.faces, camera)
+    seen = face_of >= 0
+    picture = np.broadcast_to(_PAPER, (*depth.shape, 3)).copy()
+    faces = mesh.faces[face_of[seen]]
+    shares = _barycentric(points[faces], camera.unproject_image(depth)[seen])
+    flat = face_normals(points, faces)
+    facing = flat[:, 2] / np.maximum(np.linalg.norm(flat, axis=1), np.finfo(float).tiny)
+    light = np.abs(facing)
+    if smooth and mesh.normals is not None:
+        turned = picture_from_world.turn(mesh.normals)
+        light = np.abs(np.einsum("nk,nk->n", shares, turned[faces][..., 2]))
+    color = np.broadcast_to(_FRONT, (len(faces), 3))
+    if mesh.colors is not None:
+        color = np.einsum("nk,nkc->nc", shares, mesh.colors[faces].astype(float))
+    color = np.where((facing > 0)[:, None], _BACK, color)
+    picture[seen] = color * (_AMBIENT + (1 - _AMBIENT) * np.minimum(light, 1.0))[:, None]
+    return _shrunk(picture)
+
+
+def side_by_side(pictures: Sequence[ByteArray]) -> ByteArray:
+    """Pictures (H, W, 3) in one row, on white, aligned at the bottom."""
+    height = max(picture.shape[0] for picture in pictures)
+    padded = [
+        np.pad(p, ((height - p.shape[0], 0), (0, 0), (0, 0)), constant_values=255) for p in pictures
+    ]
+    return np.concatenate(padded, axis=1)
+
+
+def write_png(path: Path | str, picture: ByteArray) -> None:
+    """Write a picture (H, W, 3) as a PNG file."""
+    height, width, _ = picture.shape
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)
+    rows[:, 1:] = picture.reshape(height, -1)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    Path(path).write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks))
+
+
+def _chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def _looking_from(direction: FloatArray, up: FloatArray) -> Pose:
+    """The picture's frame (x right, y down, z away from the viewer) from the world's."""
+    away = -direction / np.linalg.norm(direction)
+    right = np.cross(away, up)
+    if np.linalg.norm(right) < 1e-9 * np.linalg.norm(up):
+        raise ValueError("up must not be parallel to the direction")
+    right = right / np.linalg.norm(right)
+    rotation = nearest_rotation(np.stack([right, np.cross(away, right), away]))
+    return Pose(rotation=rotation, translation=np.zeros(3))
+
+
+def _camera_around(points: FloatArray, size: int) -> Camera:
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    middle, extent = 0.5 * (low + high), (1 + 2 * _MARGIN) * (high - low)
+    scale = size / float(extent.max())
+    width, height = (max(1, int(np.ceil(scale * e / 2)) * 2) for e in extent)
+    return Camera(
+        model=CameraModel.ORTHOGRAPHIC,
+        width=width,
+        height=height,
+        fx=scale,
+        fy=scale,
+        cx=0.5 * (width - 1) - scale * float(middle[0]),
+        cy=0.5 * (height - 1) - scale * float(middle[1]),
+    )
+
+
+def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
+    """Shares (N, 3) of the corners (N, 3, 3) of triangles in points (N, 3) on them, by (x, y)."""
+    a, b, c = (corners[:, k, :2] for k in range(3))
+    p = points[:, :2]
+    cross = lambda v, w: v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0]  # noqa: E731
+    area = cross(b - a, c - a)
+    shares = np.stack([cross(b - p, c - p), cross(c - p, a - p), cross(a - p, b - p)], axis=1)
+    return shares / np.where(area != 0, area, 1.0)[:, None]
+
+
+def _shrunk(picture: FloatArray) -> ByteArray:
+    k = _OVERSAMPLING
+    height, width = picture.shape[0] // k, picture.shape[1] // k
+    cells = picture[: k * height, : k * width].reshape(height, k, width, k, 3)
+    return np.rint(cells.mean(axis=(1, 3))).astype(np.uint8)

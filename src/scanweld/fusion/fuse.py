@@ -8,7 +8,7 @@ import numpy as np
 from scanweld.config import FusionConfig
 from scanweld.errors import InputError
 from scanweld.fusion.color import blend_colors
-from scanweld.fusion.posed_image import PosedImage, pose_image
+from scanweld.fusion.posed_image import PosedImage, pose_images
 from scanweld.fusion.surface import drop_small_pieces, extract_surface
 from scanweld.fusion.volume import integrate
 from scanweld.geometry.mesh import TriangleMesh, vertex_normals
@@ -40,8 +40,7 @@ def fuse(
     """
     if len(scans) != len(world_from_sensor):
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
-    posed = zip(scans, world_from_sensor, strict=True)
-    images = [pose_image(scan, pose) for scan, pose in posed]
+    images = pose_images(scans, world_from_sensor)
     voxel = _voxel_size(scans, images, config)
     volume = integrate(images, voxel, config.truncation_voxels * voxel)
     logger.debug("%d blocks of voxels of %.4g", len(volume.blocks), voxel)

@@ -1,6 +1,8 @@
 """What a posed scan says to the volume: surface points with weights, and rays that went on."""
 
-from dataclasses import dataclass
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -10,12 +12,18 @@ from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan, RangeImage
 
+logger = logging.getLogger(__name__)
+
 _RIM_WEIGHT = 0.05
 """Weight of a pixel on the rim, where sensors mix near and far."""
 _RAMP_PIXELS = 6.0
 """Distance from the rim at which a pixel has its full weight."""
 _FREE_PIXELS = 3.0
 """Free pixels nearer to the silhouette do not carve."""
+_MAX_LOST = 0.02
+"""An image on whose free pixels lies this share of another scan's surface does not carve there."""
+_NUM_TRUST_POINTS = 2000
+"""Points of a scan by which the others' free pixels are judged, about."""
 _MIN_COSINE = 0.1
 """Pixels seen more obliquely than this have no say."""
 
@@ -44,22 +52,66 @@ class PosedImage:
     is_rim: BoolArray
 
 
-def pose_image(prepared: PreparedScan, world_from_sensor: Pose) -> PosedImage:
-    """The range image of a prepared scan at its pose."""
-    image = prepared.image
+def pose_images(
+    scans: Sequence[PreparedScan], world_from_sensor: Sequence[Pose]
+) -> list[PosedImage]:
+    """The range images of prepared scans at their poses."""
+    posed = zip(scans, world_from_sensor, strict=True)
+    images = [_pose_image(scan.image, pose) for scan, pose in posed]
+    free = [
+        (scan.image.kind == PixelKind.FREE) & (scan.image.outside > _FREE_PIXELS * scan.image.pixel)
+        for scan in scans
+    ]
+    trusts = free_space_trusts(images, free)
+    return [
+        replace(image, carving=np.where(is_free, trust, image.carving))
+        for image, is_free, trust in zip(images, free, trusts, strict=True)
+    ]
+
+
+def free_space_trusts(images: Sequence[PosedImage], free: Sequence[BoolArray]) -> FloatArray:
+    """How far (N,) images are to be believed where they saw nothing, from 0 to 1.
+
+    A pixel without a return is empty space for an ideal sensor only: a real one loses dark, oblique
+    and far parts of an object. One that lost a part of what another scan saw is not believed.
+    """
+    points = [_sparse(image) for image in images]
+    trusts = np.ones(len(images))
+    for j, (image, is_free) in enumerate(zip(images, free, strict=True)):
+        lost = [_look_up(is_free, image, p).mean() for p in points if len(p)]
+        trusts[j] = max(0.0, 1.0 - max(lost, default=0.0) / _MAX_LOST)
+    logger.debug("trust in free space: %s", np.round(trusts, 2))
+    return trusts
+
+
+def _look_up(mask: BoolArray, image: PosedImage, points: FloatArray) -> BoolArray:
+    """The mask's value (P,) where points (P, 3) project into the image; False outside of it."""
+    pixels, _ = image.camera.project(image.sensor_from_world.apply(points))
+    column, row = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(np.int64).T
+    inside = (row >= 0) & (row < mask.shape[0]) & (column >= 0) & (column < mask.shape[1])
+    values = np.zeros(len(points), dtype=bool)
+    values[inside] = mask[row[inside], column[inside]]
+    return values
+
+
+def _sparse(image: PosedImage) -> FloatArray:
+    """Some surface points (P, 3), off the rims, world frame."""
+    points = image.points[(image.weight > 0) & ~image.is_rim]
+    return points[:: max(1, len(points) // _NUM_TRUST_POINTS)]
+
+
+def _pose_image(image: RangeImage, world_from_sensor: Pose) -> PosedImage:
     points = image.points()
     weight = _weights(image, points)
-    carving = np.where(image.is_rim, 0.0, weight)
-    is_free = (image.kind == PixelKind.FREE) & (image.outside > _FREE_PIXELS * image.pixel)
-    carving[is_free] = 1.0
+    is_rim = _rim(image)
     return PosedImage(
         camera=image.camera,
         sensor_from_world=world_from_sensor.inverse(),
         points=world_from_sensor.apply(points),
         normals=world_from_sensor.turn(image.normals),
         weight=weight,
-        carving=carving,
-        is_rim=_rim(image),
+        carving=np.where(is_rim, 0.0, weight),
+        is_rim=is_rim,
     )
 
 
