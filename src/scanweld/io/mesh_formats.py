@@ -44,7 +44,7 @@ def read_obj(path: Path, data: bytes) -> RawScan:
     if len(sizes) > 1 or sizes[0] not in (3, 4, 6, 7):
         raise ReadError(f"{path}: its vertices have {sizes} numbers, not all 3; export it anew")
     table = np.array(vertices)
-    colors = to_bytes(table[:, -3:], is_float=True) if sizes[0] >= 6 else None
+    colors = to_bytes(table[:, -3:], "f8") if sizes[0] >= 6 else None
     return RawScan(points=table[:, :3], faces=_faces(counts, corners), colors=colors)
 
 
@@ -77,7 +77,7 @@ def read_off(path: Path, data: bytes) -> RawScan:
         points=table[:, :3],
         faces=_off_faces(path, rows[num_vertices:]),
         normals=table[:, 3:6] if kind[2] and table.shape[1] >= 6 else None,
-        colors=to_bytes(colors, is_float=bool((colors % 1).any())) if colored else None,
+        colors=to_bytes(colors) if colored else None,
     )
 
 

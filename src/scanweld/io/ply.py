@@ -26,6 +26,8 @@ _COLORS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
 )
+# Above this a double, as which the numbers of ASCII files are read, is not exact.
+_LARGEST_INDEX = 2**53
 _INDEX_LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -90,8 +92,7 @@ def _bytes(
     if values is None:
         return None
     types = {prop.name: prop.type for prop in element.properties}
-    declared = types[names[0]]
-    found = to_bytes(values, is_float=declared[0] == "f", is_wide=declared[1] != "1")
+    found = to_bytes(values, types[names[0]])
     if found is None:
         logger.warning("%s: %s are on no known scale, so they are left out", path, ", ".join(names))
     return found
@@ -107,9 +108,10 @@ def _index_list(path: Path, columns: Columns) -> tuple[IntArray, IntArray] | Non
     column = next((columns[name] for name in _INDEX_LISTS if name in columns), None)
     if not isinstance(column, Ragged):
         return None
-    if column.values.dtype.kind == "f" and not np.equal(column.values % 1, 0).all():
+    values = column.values
+    if not ((np.abs(values) < _LARGEST_INDEX) & (values == np.rint(values))).all():
         raise ReadError(f"{path}: a vertex index is not a whole number; export the file anew")
-    return column.counts, column.values.astype(np.int64)
+    return column.counts, values.astype(np.int64)
 
 
 def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | None, tuple[str, ...]]:

@@ -170,11 +170,11 @@ def _walk(
                 at += size * int(length)
     except (struct.error, ValueError, OverflowError) as error:
         raise _BodyError(_TRUNCATED) from error
+    if not start <= at <= len(body):
+        raise _BodyError(_TRUNCATED)
     counts = np.array(lengths).astype(np.int64)
     if (counts != lengths).any() or counts.min() < 0:
         raise _BodyError("a list's length is not a whole number from 0 up")
-    if at > len(body):
-        raise _BodyError(_TRUNCATED)
     shape = (element.count, len(steps))
     return np.array(begins, dtype=np.int64).reshape(shape), counts.reshape(shape), at
 

@@ -110,21 +110,24 @@ def fan_triangles(counts: IntArray, corners: IntArray) -> IntArray:
     return np.stack([corners[begin], corners[begin + step + 1], corners[begin + step + 2]], axis=1)
 
 
-def to_bytes(values: NDArray, is_float: bool, is_wide: bool = False) -> ByteArray | None:
+def to_bytes(values: NDArray, type_code: str = "") -> ByteArray | None:
     """Colours or intensities as 0 to 255; None where their scale cannot be told.
 
     Args:
         values: Of any shape.
-        is_float: Whether they were stored as floating point: then up to 1 means parts of one.
-        is_wide: Whether they were stored as 16-bit integers, up to 65535.
+        type_code: NumPy code of the type in which they were stored: floating point up to 1 means
+            parts of one, integers of two bytes and more go to 65535 if they pass 255. Where it is
+            not known (text), fractions mean floating point.
     """
+    has_fractions = bool((values != np.rint(values)).any())
+    is_float = type_code.startswith("f") if type_code else has_fractions
     scaled = np.nan_to_num(values.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
     top = float(scaled.max(initial=0.0))
     if is_float and top <= 1.0:
         scaled = scaled * 255.0
-    elif is_wide and top > 255.0:
+    elif type_code in ("i2", "u2", "i4", "u4") and top > 255.0:
         scaled = scaled / 257.0
-    if scaled.size and (scaled.max() > 255.5 or scaled.min() < 0.0):
+    if scaled.max(initial=0.0) > 255.5 or scaled.min(initial=0.0) < 0.0:
         return None
     return np.rint(np.minimum(scaled, 255.0)).astype(np.uint8)
 

@@ -96,7 +96,7 @@ def _raw_scan(path: Path, table: FloatArray) -> RawScan:
     last = table[:, -3:]
     has_normals = width == 6 and _are_unit_vectors(last)
     has_colors = width >= 6 and not has_normals
-    colors = _to_bytes(last) if has_colors else None
+    colors = to_bytes(last) if has_colors else None
     if has_colors and colors is None:
         raise ReadError(
             f"{path}: its last three columns are neither unit normals nor colours (0 to 255, or 0 "
@@ -106,13 +106,8 @@ def _raw_scan(path: Path, table: FloatArray) -> RawScan:
         points=table[:, :3],
         normals=last if has_normals else None,
         colors=colors,
-        intensity=_to_bytes(table[:, 3]) if width in (4, 7) else None,
+        intensity=to_bytes(table[:, 3]) if width in (4, 7) else None,
     )
-
-
-def _to_bytes(values: FloatArray) -> np.ndarray | None:
-    """Colours of text, where the numbers alone tell the scale: a fraction means parts of one."""
-    return to_bytes(values, is_float=bool((values % 1).any()))
 
 
 def _are_unit_vectors(vectors: FloatArray) -> bool:
