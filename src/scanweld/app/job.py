@@ -1,0 +1,70 @@
+"""The main job: files to an output folder."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scanweld import pipeline
+from scanweld.app.outputs import write_outputs
+from scanweld.app.workspace import Workspace
+from scanweld.config import Config
+from scanweld.errors import ReadError
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import ScanFile, collect, read_scan
+from scanweld.progress import Progress, silent
+from scanweld.reconstruction import Reconstruction
+
+
+def run_job(
+    inputs: Sequence[Path | str],
+    output: Path | str,
+    config: Config | None = None,
+    *,
+    workers: int | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Reconstruction:
+    """Read scans, register and fuse them, and write what was found out: ``scanweld run``.
+
+    Args:
+        inputs: Files, folders and glob patterns.
+        output: The folder to be made; it appears when it is whole.
+        config: Settings; the defaults if not given.
+        workers: Threads; as many as there are cores if not given.
+        force: Whether an output that is there already is replaced.
+        progress: Called with (stage, done, total).
+
+    Raises:
+        ScanweldError: If there is too little to work on, or the output cannot be written. Files
+            that cannot be read are named in the result instead.
+    """
+    files = collect(inputs)
+    paths = [file.path for file in files]
+    with Workspace(Path(output), inputs=paths, force=force) as workspace:
+        scans, unreadable = read_all(files, progress)
+        result = pipeline.run(
+            scans,
+            config or Config(),
+            unreadable=unreadable,
+            workers=workers,
+            cache=workspace.cache,
+            progress=progress,
+        )
+        write_outputs(result, workspace.staging)
+        workspace.publish()
+    return result
+
+
+def read_all(
+    files: Sequence[ScanFile], progress: Progress = silent
+) -> tuple[list[RangeScan], dict[str, str]]:
+    """Scans of all files that can be read, and for the others name -> reason."""
+    scans: list[RangeScan] = []
+    unreadable: dict[str, str] = {}
+    for done, file in enumerate(files):
+        progress("read", done, len(files))
+        try:
+            scans.append(read_scan(file.path, file.name))
+        except ReadError as error:
+            unreadable[file.name] = str(error)
+    progress("read", len(files), len(files))
+    return scans, unreadable

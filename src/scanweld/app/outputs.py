@@ -1,0 +1,83 @@
+"""What a run writes: poses.json, graph.json, report.json, config.toml and model.ply."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from scanweld.app.json_text import json_text
+from scanweld.geometry.pose import Pose
+from scanweld.io import PoseSet, natural_key, write_mesh_ply, write_poses, write_whole
+from scanweld.reconstruction import PairReport, Reconstruction, StageReport
+
+FORMAT = 1
+
+Json = Mapping[str, Any]
+
+
+def write_outputs(result: Reconstruction, folder: Path) -> None:
+    """Write everything a run found out into a folder.
+
+    Args:
+        result: What the run found out.
+        folder: An existing folder. There is no model.ply where there is no mesh.
+
+    Raises:
+        WriteError: If a file cannot be written.
+    """
+    poses = PoseSet(
+        poses=dict(result.poses), components=result.components, unplaced=dict(result.unplaced)
+    )
+    write_poses(folder / "poses.json", poses)
+    write_whole(folder / "graph.json", json_text(graph_json(result)).encode())
+    write_whole(folder / "report.json", json_text(report_json(result)).encode())
+    write_whole(folder / "config.toml", result.config.to_toml().encode())
+    if result.mesh is not None:
+        write_mesh_ply(folder / "model.ply", result.mesh)
+
+
+def graph_json(result: Reconstruction) -> Json:
+    """What was found out about every pair."""
+    return {"format": FORMAT, "pairs": [_pair(pair) for pair in result.pairs]}
+
+
+def report_json(result: Reconstruction) -> Json:
+    """The verdict, as a whole and scan by scan, the stages' costs and the settings."""
+    names = sorted(result.scans, key=natural_key)
+    return {
+        "format": FORMAT,
+        "verdict": result.verdict.value,
+        "exit_code": result.verdict.exit_code,
+        "reasons": list(result.reasons),
+        "scans": {name: asdict(result.scans[name]) for name in names},
+        "stages": {name: _stage(stage) for name, stage in result.stages.items()},
+        "settings": result.config.model_dump(mode="json"),
+    }
+
+
+def _pair(pair: PairReport) -> Json:
+    return {
+        "i": pair.i,
+        "j": pair.j,
+        "kind": pair.kind.value,
+        "accepted": pair.accepted,
+        "reason": pair.reason,
+        "i_from_j": None if pair.i_from_j is None else _matrix(pair.i_from_j),
+        "score": pair.score,
+        "overlap": pair.overlap,
+        "evidence": None if pair.evidence is None else asdict(pair.evidence),
+        "margin": pair.margin,
+        "observability": pair.observability,
+        "alternatives": [
+            {"i_from_j": _matrix(other.i_from_j), "score": other.score}
+            for other in pair.alternatives
+        ],
+    }
+
+
+def _stage(stage: StageReport) -> Json:
+    return {"seconds": round(stage.seconds, 3), "peak_mb": round(stage.peak_mb, 1), **stage.counts}
+
+
+def _matrix(pose: Pose) -> list[list[float]]:
+    return pose.matrix().tolist()

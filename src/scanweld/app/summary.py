@@ -1,0 +1,43 @@
+"""What a run found out, in a few lines."""
+
+from pathlib import Path
+
+from scanweld.io import natural_key
+from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+
+
+def summary(result: Reconstruction, output: Path) -> str:
+    """Verdict in a sentence, what could not be placed and why, and where the files are."""
+    lines = [f"{result.verdict.value}: {sentence(result)}"]
+    lines += [f"  {reason}" for reason in result.reasons]
+    lines += [f"  unplaced {name}: {reason}" for name, reason in _in_order(dict(result.unplaced))]
+    doubtful = {
+        name: scan.reason
+        for name, scan in result.scans.items()
+        if scan.verdict is ScanVerdict.DOUBTFUL
+    }
+    lines += [f"  doubtful {name}: {reason}" for name, reason in _in_order(doubtful)]
+    if len(result.components) > 1:
+        lines += [f"  component {k + 1}: {', '.join(c)}" for k, c in enumerate(result.components)]
+    lines.append(f"  {output}: {', '.join(_files(result))}")
+    return "\n".join(lines)
+
+
+def sentence(result: Reconstruction) -> str:
+    """How many scans are placed, and in how many pieces."""
+    total, placed = len(result.scans), len(result.poses)
+    if result.verdict is Verdict.NOTHING:
+        return f"no two of the {total} scans could be brought together"
+    share = f"all {total} scans are" if placed == total else f"{placed} of {total} scans are"
+    pieces = len(result.components)
+    return f"{share} placed" + (f", in {pieces} separate components" if pieces > 1 else "")
+
+
+def _in_order(reasons: dict[str, str]) -> list[tuple[str, str]]:
+    return sorted(reasons.items(), key=lambda item: natural_key(item[0]))
+
+
+def _files(result: Reconstruction) -> list[str]:
+    mesh = result.mesh
+    model = [] if mesh is None else [f"model.ply ({len(mesh.vertices):,} vertices)"]
+    return [*model, "poses.json", "graph.json", "report.json", "config.toml"]
