@@ -5,6 +5,7 @@ Exit codes: 0 good, 1 error, 2 usage, 3 a verdict other than good, 130 interrupt
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from importlib.metadata import version
 from pathlib import Path
@@ -12,13 +13,23 @@ from typing import Annotated
 
 import typer
 
+from scanweld.app.comparison import compare, comparison_table
+from scanweld.app.info import describe_scan
 from scanweld.app.job import run_job
 from scanweld.app.progress import reporting
 from scanweld.app.summary import summary
 from scanweld.app.workspace import work_folder
 from scanweld.config import load_config
 from scanweld.errors import ScanweldError
+from scanweld.evaluation.metrics import Standing
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.simulate import TYPICAL_NOISE
+from scanweld.evaluation.simulate import simulate as make_scans
+from scanweld.geometry.camera import CameraModel
+from scanweld.io import collect, read_mesh, read_scan
 
+ERROR = 1
+NOT_GOOD = 3
 INTERRUPTED = 130
 
 app = typer.Typer(
@@ -27,6 +38,13 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Unordered range scans of an object to one registered, fused 3D model and a verdict.",
 )
+
+
+class Sensor(StrEnum):
+    """Cameras of the virtual scanner."""
+
+    PINHOLE = "pinhole"
+    ORTHOGRAPHIC = "orthographic"
 
 
 class LengthUnit(StrEnum):
@@ -40,6 +58,9 @@ class LengthUnit(StrEnum):
 
 Inputs = Annotated[
     list[str], typer.Argument(metavar="INPUTS...", help="Scan files, folders or glob patterns.")
+]
+Files = Annotated[
+    list[str], typer.Argument(metavar="FILES...", help="Scan files, folders or glob patterns.")
 ]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
@@ -79,6 +100,65 @@ def run(
     raise typer.Exit(result.verdict.exit_code)
 
 
+@app.command()
+def info(files: Files) -> None:
+    """Show what was read from scan files, and what was assumed."""
+    failed = False
+    for file in collect(files):
+        try:
+            typer.echo(describe_scan(read_scan(file.path, file.name)))
+        except ScanweldError as error:
+            _print_error(error)
+            failed = True
+    raise typer.Exit(ERROR if failed else 0)
+
+
+@app.command()
+def simulate(
+    mesh: Annotated[Path, typer.Argument(help="The object: a mesh file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="New folder for the scans.")],
+    num_scans: Annotated[int, typer.Option(min=2, help="Scans from all around.")] = 10,
+    camera: Annotated[Sensor, typer.Option(help="Camera model.")] = Sensor.PINHOLE,
+    pixels: Annotated[int, typer.Option(min=20, help="Pixels across the object.")] = 300,
+    noise: Annotated[
+        float,
+        typer.Option(min=0, max=0.1, help="Of depth, in object diameters; 0 for perfect scans."),
+    ] = TYPICAL_NOISE.depth_diameters,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
+) -> None:
+    """Scan a mesh with a virtual scanner; the true poses go to truth/poses.json."""
+    model = CameraModel[camera.name]
+    noisy = replace(TYPICAL_NOISE, depth_diameters=noise) if noise else NoiseModel()
+    truth = make_scans(
+        read_mesh(mesh),
+        output,
+        num_scans=num_scans,
+        model=model,
+        pixels=pixels,
+        noise=noisy,
+        seed=seed,
+    )
+    typer.echo(f"{output}: {len(truth.poses)} scans, and truth/poses.json")
+
+
+@app.command()
+def evaluate(
+    estimate: Annotated[Path, typer.Argument(help="poses.json of a run.")],
+    truth: Annotated[Path, typer.Argument(help="True poses: the same format, or {name: 4x4}.")],
+    scans: Annotated[
+        list[str], typer.Option(help="The scans: errors are then in percent of the diameter.")
+    ] = [],  # noqa: B006
+) -> None:
+    """Compare poses with the truth; exit code 3 unless all scans are right."""
+    errors = compare(estimate, truth, scans)
+    typer.echo(comparison_table(errors))
+    raise typer.Exit(0 if errors.count(Standing.RIGHT) == len(errors.scans) else NOT_GOOD)
+
+
+def _print_error(error: ScanweldError) -> None:
+    typer.echo(f"scanweld: error: {' '.join(str(error).split())}", err=True)
+
+
 def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"scanweld {version('scanweld')}")
@@ -100,6 +180,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         app(args=None if arguments is None else list(arguments), prog_name="scanweld")
     except ScanweldError as error:
-        message = " ".join(str(error).split())
-        typer.echo(f"scanweld: error: {message}", err=True)
-        sys.exit(1)
+        _print_error(error)
+        sys.exit(ERROR)
