@@ -153,11 +153,11 @@ def _linear_pinhole(unit: FloatArray, pixels: FloatArray) -> FloatArray | None:
 
 
 def _decompose(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Intrinsics fx, fy, cx, cy, the rotation and the shift of a (3, 4) with positive determinant."""
-    upper, rotation = rq(matrix[:, :3])
+    """Intrinsics fx, fy, cx, cy, rotation and shift of a (3, 4) with positive determinant."""
+    upper, rotation = (np.asarray(part, dtype=np.float64) for part in rq(matrix[:, :3]))
     signs = np.sign(np.diag(upper))
     upper, rotation = upper * signs, signs[:, None] * rotation
-    shift = np.linalg.solve(upper, matrix[:, 3])
+    shift: FloatArray = np.linalg.solve(upper, matrix[:, 3]).astype(np.float64)
     upper = upper / upper[2, 2]
     return np.array([upper[0, 0], upper[1, 1], upper[0, 2], upper[1, 2]]), rotation, shift
 
@@ -175,7 +175,7 @@ def _polish(
     for _ in range(NUM_STEPS):
         normal = jacobian.T @ jacobian
         normal[np.diag_indices(10)] *= 1 + damping
-        step = -np.linalg.lstsq(normal, jacobian.T @ residuals, rcond=None)[0]
+        step = -np.asarray(np.linalg.lstsq(normal, jacobian.T @ residuals)[0], dtype=np.float64)
         candidate = (
             intrinsics + step[:4],
             nearest_rotation(rotation_exp(step[4:7]) @ rotation),

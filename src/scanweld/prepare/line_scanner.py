@@ -29,6 +29,7 @@ class Sight:
             ``has_side``, else its sign means nothing.
         right: (3,) unit, square to the axis, along which columns grow.
         pitch: Spacing of the cells on the object, in the scan's unit.
+        misfit: Residual of the fits over the spread of the cells.
         has_side: Whether the grid fans out, which tells the sensor's side.
         is_oblique: Whether the axis is halfway between oblique lines of sight and the direction
             square to the travel.
@@ -37,6 +38,7 @@ class Sight:
     axis: FloatArray
     right: FloatArray
     pitch: float
+    misfit: float
     has_side: bool
     is_oblique: bool
 
@@ -85,7 +87,12 @@ def line_of_sight(points: FloatArray, pixels: FloatArray) -> Sight:
     right = fits[0].gradient - (fits[0].gradient @ sight) * sight
     pitch = scale * float(np.mean([1 / np.linalg.norm(fit.gradient) for fit in fits]))
     return Sight(
-        axis=sight, right=_unit(right), pitch=pitch, has_side=has_side, is_oblique=is_oblique
+        axis=sight,
+        right=_unit(right),
+        pitch=pitch,
+        misfit=max(fit.rms / fit.spread for fit in fits),
+        has_side=has_side,
+        is_oblique=is_oblique,
     )
 
 

@@ -1,7 +1,7 @@
 """Point spacing of a scan."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import FloatArray
 
@@ -15,7 +15,7 @@ def point_spacing(points: FloatArray) -> float:
     Exact duplicates do not count as neighbours. Zero if all points coincide.
     """
     queries = points[:: max(1, len(points) // NUM_QUERIES)]
-    distances = cKDTree(points).query(queries, k=min(4, len(points)))[0].reshape(len(queries), -1)
+    distances = KDTree(points).query(queries, k=min(4, len(points)))[0].reshape(len(queries), -1)
     nearest = np.where(distances > 0, distances, np.inf).min(axis=1)
     nearest = nearest[np.isfinite(nearest)]
     return float(np.median(nearest)) if len(nearest) else 0.0

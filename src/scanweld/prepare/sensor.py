@@ -10,11 +10,20 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
-from scanweld.prepare.camera_fit import CameraFit, fit_orthographic, fit_pinhole
+from scanweld.prepare.camera_fit import (
+    MAX_RMS_PIXELS,
+    CameraFit,
+    fit_orthographic,
+    fit_pinhole,
+)
 from scanweld.prepare.line_scanner import line_of_sight
 from scanweld.prepare.resolution import point_spacing
 from scanweld.prepare.sensor_side import find_side
-from scanweld.prepare.viewpoint import depth_image, principal_frame
+from scanweld.prepare.viewpoint import (
+    depth_image,
+    line_of_sight_of_points,
+    surface_points,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -28,12 +37,22 @@ SAME_RMS_PIXELS = 0.02
 """Below this residual an orthographic camera is as good as any."""
 SAME_RMS_RATIO = 1.5
 """A pinhole must be this many times better than an orthographic camera to be preferred."""
+MAX_MISFIT = 0.1
+"""A grid whose cells depend on the points less simply than this is none of a single viewpoint."""
+MAX_LAYERED = 0.25
+"""Share of points behind others above which they cannot have been seen from one viewpoint."""
+IMAGE_SPACINGS = 2.0
+"""Pixel of the depth image on which the side of points without a grid is judged."""
 STAND_OFF_DIAMETERS = 2.0
 """How far before the object's centroid a sensor is put of which only the direction is known."""
 
 OBLIQUE_NOTE = (
     "the grid looks obliquely to the scanner's travel, as a camera beside a sheet of light does; "
     "the viewing direction is halfway between both"
+)
+
+COMPLETE_NOTE = (
+    "the surface was not seen from one viewpoint: a complete model, or several scans in one file"
 )
 
 
@@ -51,10 +70,7 @@ def locate_sensor(scan: RangeScan) -> RangeScan:
     _check_usable(scan)
     if scan.scan_from_sensor is not None:
         return scan
-    if scan.grid is not None and np.count_nonzero(scan.grid >= 0) >= MIN_POINTS:
-        found = _from_grid(scan, scan.grid)
-    else:
-        found = _from_surface(scan)
+    found = _in_own_frame(scan) or _from_grid(scan) or _from_surface(scan)
     logger.debug("%s: sensor %s, %s", scan.name, found.viewpoint, "; ".join(found.notes))
     return found
 
@@ -71,14 +87,43 @@ def _check_usable(scan: RangeScan) -> None:
         raise InputError(f"{scan.name}: all points lie on one line; a scan needs a surface")
 
 
-def _from_grid(scan: RangeScan, grid: IntArray) -> RangeScan:
-    """Fit the simplest camera to a grid, or else its line of sight."""
+def _in_own_frame(scan: RangeScan) -> RangeScan | None:
+    """The scan with the sensor at the origin, if its camera has no pose but sees it from there."""
+    if scan.camera is None:
+        return None
+    pixels, depth = scan.camera.project(scan.points)
+    if scan.grid is None:
+        inside = (pixels > -1) & (pixels < (scan.camera.width, scan.camera.height))
+        is_seen = bool((inside.all(axis=1) & (depth > 0)).all())
+    else:
+        points, cells = _cells(scan.points, scan.grid)
+        pixels, _ = scan.camera.project(points)
+        is_seen = bool(np.median(np.abs(pixels - cells)) < MAX_RMS_PIXELS)
+    if not is_seen:
+        return None
+    note = "the camera has no pose; the points fit it as they are, so they are in its frame"
+    return scan.with_sensor(Pose.identity(), Viewpoint.ESTIMATED, note)
+
+
+def _cells(points: FloatArray, grid: IntArray) -> tuple[FloatArray, FloatArray]:
+    """The grid's points (M, 3) and their cells (M, 2) (column, row), evenly thinned."""
     rows, columns = np.nonzero(grid >= 0)
     stride = max(1, len(rows) // MAX_FIT_CELLS)
-    pixels = np.stack([columns, rows], axis=1)[::stride].astype(np.float64)
-    points = scan.points[grid[rows, columns]][::stride]
-    height, width = grid.shape
+    rows, columns = rows[::stride], columns[::stride]
+    return points[grid[rows, columns]], np.stack([columns, rows], axis=1).astype(np.float64)
+
+
+def _from_grid(scan: RangeScan) -> RangeScan | None:
+    """The scan with the simplest camera fitted to its grid, or else its line of sight."""
+    if scan.grid is None or np.count_nonzero(scan.grid >= 0) < MIN_POINTS:
+        return None
+    points, pixels = _cells(scan.points, scan.grid)
+    height, width = scan.grid.shape
+    if pixels.std(axis=0).min() < 1:
+        return None
     sight = line_of_sight(points, pixels)
+    if sight.misfit > MAX_MISFIT:
+        return None
     orthographic = fit_orthographic(points, pixels, (height, width), sight.axis)
     if orthographic is None or orthographic.rms > SAME_RMS_PIXELS:
         pinhole = fit_pinhole(points, pixels, (height, width))
@@ -86,8 +131,7 @@ def _from_grid(scan: RangeScan, grid: IntArray) -> RangeScan:
             return _with_camera(scan, pinhole)
     axis, notes = sight.axis, ()
     if not sight.has_side:
-        depth = np.full(grid.shape, np.nan)
-        depth[rows, columns] = scan.points[grid[rows, columns]] @ axis
+        depth = np.where(scan.grid >= 0, (scan.points @ axis)[scan.grid], np.nan)
         axis, notes = _sided(scan, axis, depth, sight.pitch)
     if orthographic:
         turned = fit_orthographic(points, pixels, (height, width), axis)
@@ -99,12 +143,15 @@ def _from_grid(scan: RangeScan, grid: IntArray) -> RangeScan:
 
 
 def _from_surface(scan: RangeScan) -> RangeScan:
-    """Estimate the viewing direction of points or a mesh without a grid."""
-    frame = principal_frame(scan.points)
-    cell = 2 * point_spacing(scan.points)
-    axis, notes = _sided(scan, frame[2], depth_image(scan.points, frame, cell), cell)
-    note = "the file says nothing of the viewpoint; it was estimated from the points"
-    return _with_direction(scan, axis, frame[0], Viewpoint.ESTIMATED, note, *notes)
+    """Estimate the viewing direction of points or a mesh without a usable grid."""
+    points = surface_points(scan)
+    axis, right, layered = line_of_sight_of_points(points)
+    cell = IMAGE_SPACINGS * point_spacing(points)
+    axis, notes = _sided(scan, axis, depth_image(points, axis, right, cell), cell)
+    if layered > MAX_LAYERED:
+        notes = (COMPLETE_NOTE, *notes)
+    note = "the file does not tell the viewpoint; it was estimated from the surface"
+    return _with_direction(scan, axis, right, Viewpoint.ESTIMATED, note, *notes)
 
 
 def _sided(

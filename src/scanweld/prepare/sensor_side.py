@@ -8,7 +8,7 @@ which is reported. If none is strong, the strongest decides and the side is call
 2. normals of the file turn towards the sensor.
 3. fall-off: surfaces curve away, so that depth grows towards the silhouette.
 
-How a grid fans out is better than all of these, and known before (``line_scanner``, ``camera_fit``).
+How a grid fans out is better than all of these and known before (``camera_fit``, ``line_scanner``).
 """
 
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ class Side:
             return f"the side on which the sensor stood is a guess (by {self.cue})"
         if self.contradicts:
             other = " and ".join(self.contradicts)
-            return f"the side on which the sensor stood is taken from {self.cue}; {other} contradict it"
+            return f"the sensor's side is taken from {self.cue}, which {other} contradict"
         return None
 
 
@@ -92,9 +92,13 @@ def fall_off(depth: FloatArray, pixel: float) -> float:
     seen = np.isfinite(image)
     disk = ndimage.iterate_structure(ndimage.generate_binary_structure(2, 1), RIM_PIXELS)
     inside = ndimage.binary_fill_holes(ndimage.binary_closing(seen, disk))
-    distance, nearest = ndimage.distance_transform_edt(inside, return_indices=True)
-    rows, columns = np.nonzero(seen & (distance <= RIM_PIXELS))
-    inward = np.stack([rows, columns]) - nearest[:, rows, columns]
+    outside = np.asarray(
+        ndimage.distance_transform_edt(inside, return_distances=False, return_indices=True)
+    )
+    rows, columns = np.nonzero(seen)
+    inward = np.stack([rows, columns]) - outside[:, rows, columns]
+    is_rim = (inward**2).sum(axis=0) <= RIM_PIXELS**2
+    rows, columns, inward = rows[is_rim], columns[is_rim], inward[:, is_rim]
     inward = inward / np.linalg.norm(inward, axis=0)
     deeper_rows, deeper_columns = np.rint([rows, columns] + STEP_PIXELS * inward).astype(int)
     rise = image[rows, columns] - image[deeper_rows, deeper_columns]
