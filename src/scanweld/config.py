@@ -84,6 +84,18 @@ class GraphConfig(Section):
     """Closing error above which a cycle of pairs contradicts itself."""
     max_cycle_diameters: float = Field(0.03, gt=0)
     """The same for the shift."""
+    min_edge_score: float = Field(-0.05, ge=-1, le=1)
+    """Score below which a pair is not called accepted even where it agrees with the poses."""
+    min_mutual_score: float = Field(0.15, ge=0)
+    """Score of a merge that rests on several weak pairs that propose the same motion."""
+    max_mutual_violated_share: float = Field(0.1, ge=0)
+    """Samples that the other sensors contradict in such a merge, as a share of those that agree."""
+    min_margin: float = Field(0.2, ge=0, le=1)
+    """Share of its score by which a merge must beat the best distinct one."""
+    max_violated_share: float = Field(0.15, ge=0)
+    """Samples that the other sensors contradict, as a share of those that agree."""
+    max_violation: float = Field(0.03, ge=0)
+    """Share of samples by which violation may exceed half the agreement in any implied pair."""
 
 
 class ContoursConfig(Section):
@@ -97,6 +109,9 @@ class ContoursConfig(Section):
     """Outer iterations: predicted range images are rendered anew in each."""
     num_steps: int = Field(3, ge=1)
     """Inner iterations between two renderings."""
+    residual: Literal["point", "normal"] = "normal"
+    """Distance of contours in 3D, as published, or that followed by their distance across the
+    outline in the image, which is unbiased."""
 
 
 class RefineConfig(Section):

@@ -15,7 +15,9 @@ AGREE_COSINE = 0.75
 CONTRADICT_COSINE = 0.3
 
 
-def judge(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> tuple[Evidence, Evidence]:
+def judge(
+    i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float, max_samples: int = 10**9
+) -> tuple[Evidence, Evidence]:
     """Evidence on a relative pose in both directions.
 
     Args:
@@ -23,24 +25,20 @@ def judge(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> tuple
         j: Second scan.
         i_from_j: The pose to judge, sensor frames.
         tolerance: Depth tolerance, in the scans' unit.
+        max_samples: Samples of each scan that are asked about, at most.
 
     Returns:
         What sensor j says of i's samples, and what sensor i says of j's.
     """
     poses = pose_rows([i_from_j])
-    counts = count_evidence(*kernel_view(i), *kernel_view(j), poses, len(i.points), tolerance)[0]
-    return _evidence(counts[0], len(i.points)), _evidence(counts[1], len(j.points))
+    counts = count_evidence(*kernel_view(i), *kernel_view(j), poses, max_samples, tolerance)[0]
+    return _evidence(counts[0]), _evidence(counts[1])
 
 
 def mean_evidence(a: Evidence, b: Evidence) -> Evidence:
     """The mean of both directions."""
     names = ("agree", "front", "contradict", "free", "occluded", "unknown")
     return Evidence(**{name: 0.5 * (getattr(a, name) + getattr(b, name)) for name in names})
-
-
-def overlap_of(evidence: Evidence) -> float:
-    """Share of the samples that agree."""
-    return evidence.agree
 
 
 def pose_rows(poses: list[Pose]) -> FloatArray:
@@ -57,8 +55,8 @@ def kernel_view(
     return field.camera, field.raster, field.points, field.normals
 
 
-def _evidence(counts: NDArray[np.int64], total: int) -> Evidence:
-    share = counts / max(total, 1)
+def _evidence(counts: NDArray[np.int64]) -> Evidence:
+    share = counts / max(int(counts.sum()), 1)
     return Evidence(
         agree=float(share[AGREE]),
         front=float(share[FRONT]),

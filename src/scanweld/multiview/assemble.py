@@ -1,0 +1,284 @@
+"""Pairs -> view graph: merge greedily from the strongest, judged by all implied pairs."""
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from scanweld.config import GraphConfig
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.multiview.merge import Judge, Merge, Support, is_near, propose_merges
+from scanweld.multiview.view_graph import Component, Edge, ViewGraph
+from scanweld.pairs.result import Alternative, PairKind, PairResult
+
+logger = logging.getLogger(__name__)
+
+Settle = Callable[[Mapping[int, Pose]], Mapping[int, Pose]]
+"""Refines the poses of a component a little, so that chains of pairs do not drift."""
+
+MAX_RETRIES = 3
+MAX_SUSPECTS = 12
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class _Assembly:
+    """One outcome of greedy merging."""
+
+    components: tuple[Mapping[int, Pose], ...]
+    used: tuple[Support, ...]
+    accepted: Mapping[Edge, Alternative] = field(default_factory=dict)
+
+    @property
+    def support(self) -> float:
+        return sum(max(option.score, 0.0) for option in self.accepted.values())
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class _Problem:
+    """What stays the same in all attempts."""
+
+    num_scans: int
+    pairs: Mapping[Edge, PairResult]
+    centres: Sequence[FloatArray]
+    near: tuple[float, float]
+    judge: Judge
+    settle: Settle
+    config: GraphConfig
+
+
+def build_view_graph(
+    num_scans: int,
+    pairs: Mapping[Edge, PairResult],
+    centres: Sequence[FloatArray],
+    diameter: float,
+    judge: Judge,
+    settle: Settle,
+    config: GraphConfig,
+) -> ViewGraph:
+    """Place all scans that the pairs can place without contradiction.
+
+    Components grow by the best merge that passes: one good pair, or several pairs that propose
+    the same motion, with every implied pair across free of contradictions. Where good pairs end
+    up outside, the merges that may have shut them out are taken back one at a time, and the
+    assembly that explains most is kept.
+
+    Args:
+        num_scans: How many scans there are.
+        pairs: Results of pairs (i, j), i < j.
+        centres: (3,) middle of each scan's samples, sensor frame.
+        diameter: Diameter of the run.
+        judge: Gives the evidence on any pair at any pose.
+        settle: Refines a component's poses.
+        config: Settings.
+    """
+    near = (config.max_cycle_deg, config.max_cycle_diameters * diameter)
+    problem = _Problem(
+        num_scans=num_scans,
+        pairs=pairs,
+        centres=centres,
+        near=near,
+        judge=judge,
+        settle=settle,
+        config=config,
+    )
+    best = _assemble(problem, frozenset())
+    banned: frozenset[tuple[int, int, int]] = frozenset()
+    for _ in range(MAX_RETRIES):
+        trials = [banned | {suspect} for suspect in _suspects(problem, best)]
+        outcomes = [(_assemble(problem, trial), trial) for trial in trials]
+        better = max(outcomes, key=lambda outcome: outcome[0].support, default=None)
+        if better is None or better[0].support <= best.support * 1.02:
+            break
+        best, banned = better
+        logger.info("took back pair %s: the rest then agrees", sorted(banned))
+    return _graph(problem, best)
+
+
+def _assemble(problem: _Problem, banned: frozenset[tuple[int, int, int]]) -> _Assembly:
+    components: list[Mapping[int, Pose]] = [{k: Pose.identity()} for k in range(problem.num_scans)]
+    known: dict[tuple[tuple[int, ...], tuple[int, ...]], Merge | None] = {}
+    used: list[Support] = []
+    while True:
+        found = _best_merge(problem, components, banned, known)
+        if found is None:
+            break
+        merge, a, b = found
+        moved = {k: merge.a_from_b @ pose for k, pose in components[b].items()}
+        merged = dict(sorted({**components[a], **moved}.items()))
+        used.extend(merge.supports)
+        components = [c for n, c in enumerate(components) if n not in (a, b)]
+        components.append(problem.settle(merged) if len(merged) > 2 else merged)
+        logger.debug("merged into %s: score %.2f", sorted(merged), merge.score)
+    placed = tuple(c for c in components if len(c) > 1)
+    return _Assembly(components=placed, used=tuple(used), accepted=_accepted(problem, placed))
+
+
+def _best_merge(
+    problem: _Problem,
+    components: list[Mapping[int, Pose]],
+    banned: frozenset[tuple[int, int, int]],
+    known: dict[tuple[tuple[int, ...], tuple[int, ...]], Merge | None],
+) -> tuple[Merge, int, int] | None:
+    best: tuple[Merge, int, int] | None = None
+    for a in range(len(components)):
+        for b in range(a + 1, len(components)):
+            key = (tuple(components[a]), tuple(components[b]))
+            if key not in known:
+                merges = propose_merges(
+                    components[a],
+                    components[b],
+                    problem.pairs,
+                    problem.centres,
+                    problem.near,
+                    problem.judge,
+                    banned,
+                )
+                known[key] = merges[0] if merges and passes(merges[0], problem.config) else None
+            merge = known[key]
+            if merge is not None and (best is None or merge.score > best[0].score):
+                best = (merge, a, b)
+    return best
+
+
+def passes(merge: Merge, config: GraphConfig) -> bool:
+    """Whether a merge may be made: supported well enough, contradicted by no pair across."""
+    if merge.worst > config.max_violation or merge.margin < config.min_margin:
+        return False
+    if merge.violated > config.max_violated_share * merge.agree:
+        return False
+    if any(support.is_good for support in merge.supports):
+        return merge.score > 0
+    # Weak pairs count only where several of them, found separately, say the same.
+    is_clean = merge.violated <= config.max_mutual_violated_share * merge.agree
+    return len(merge.supports) > 1 and is_clean and merge.score >= config.min_mutual_score
+
+
+def _accepted(
+    problem: _Problem, components: Sequence[Mapping[int, Pose]]
+) -> dict[Edge, Alternative]:
+    """The alternative of each pair within a component that agrees with the poses."""
+    accepted: dict[Edge, Alternative] = {}
+    for poses in components:
+        for (i, j), result in problem.pairs.items():
+            if i not in poses or j not in poses:
+                continue
+            i_from_j = poses[i].inverse() @ poses[j]
+            for option in result.alternatives:
+                is_same = is_near(option.i_from_j, i_from_j, problem.centres[j], problem.near)
+                if is_same and option.score >= problem.config.min_edge_score:
+                    accepted[i, j] = option
+                    break
+    return accepted
+
+
+def _suspects(problem: _Problem, assembly: _Assembly) -> list[tuple[int, int, int]]:
+    """Alternatives that merges were made by, weakest first, if good pairs were shut out."""
+    shut_out = [
+        edge
+        for edge, result in problem.pairs.items()
+        if result.kind is PairKind.GOOD and edge not in assembly.accepted
+    ]
+    if not shut_out:
+        return []
+    touched = {scan for edge in shut_out for scan in edge}
+    suspects = [s for s in assembly.used if s.i in touched or s.j in touched]
+    suspects.sort(key=lambda s: s.score)
+    return [(min(s.i, s.j), max(s.i, s.j), s.rank) for s in suspects[:MAX_SUSPECTS]]
+
+
+def _graph(problem: _Problem, assembly: _Assembly) -> ViewGraph:
+    accepted = assembly.accepted
+    components = [_component(poses, accepted) for poses in assembly.components]
+    components.sort(key=lambda c: (-len(c.poses), min(c.poses)))
+    placed = {scan for c in components for scan in c.poses}
+    rejected = {
+        edge: _why_rejected(problem, edge, components)
+        for edge in sorted(problem.pairs)
+        if edge not in accepted
+    }
+    unplaced = {
+        k: _why_unplaced(problem, k, components) for k in range(problem.num_scans) if k not in placed
+    }
+    doubts = {}
+    for component in components:
+        doubts.update(_doubts(problem, component, accepted))
+    return ViewGraph(
+        pairs=problem.pairs,
+        accepted=dict(sorted(accepted.items())),
+        rejected=rejected,
+        components=tuple(components),
+        unplaced=unplaced,
+        doubts=doubts,
+    )
+
+
+def _component(poses: Mapping[int, Pose], accepted: Mapping[Edge, Alternative]) -> Component:
+    support = {k: 0.0 for k in poses}
+    for (i, j), option in accepted.items():
+        if i in poses:
+            support[i] += max(option.score, 0.0)
+            support[j] += max(option.score, 0.0)
+    reference = max(sorted(poses), key=lambda k: support[k])
+    to_reference = poses[reference].inverse()
+    moved = {k: to_reference @ pose for k, pose in poses.items()}
+    moved[reference] = Pose.identity()
+    return Component(poses=moved, reference=reference)
+
+
+def _why_rejected(problem: _Problem, edge: Edge, components: Sequence[Component]) -> str:
+    result = problem.pairs[edge]
+    home = next((c for c in components if edge[0] in c.poses and edge[1] in c.poses), None)
+    if result.best is None or home is None:
+        return result.reason or "its scans could not be placed together without contradictions"
+    i_from_j = home.poses[edge[0]].inverse() @ home.poses[edge[1]]
+    apart = i_from_j.inverse() @ result.best.i_from_j
+    if not is_near(result.best.i_from_j, i_from_j, problem.centres[edge[1]], problem.near):
+        return f"cycle: {apart.angle_deg():.1f} deg off what the other pairs say"
+    return result.reason or f"score {result.best.score:.2f} too low to hold"
+
+
+def _why_unplaced(problem: _Problem, scan: int, components: Sequence[Component]) -> str:
+    options = [
+        (result.best.score, result)
+        for edge, result in sorted(problem.pairs.items())
+        if scan in edge and result.best is not None
+    ]
+    if not options:
+        return "no pose brings it onto any other scan"
+    score, result = max(options, key=lambda option: option[0])
+    told = result.reason or "it contradicts other scans"
+    return f"no pair with another scan holds; the best one (score {score:.2f}): {told}"
+
+
+def _doubts(
+    problem: _Problem, component: Component, accepted: Mapping[Edge, Alternative]
+) -> dict[int, str]:
+    """Placed scans that the final poses do not bear out."""
+    doubts = {}
+    for k in component.poses:
+        others = [m for m in component.poses if m != k]
+        evidence = [
+            problem.judge(k, m, component.poses[k].inverse() @ component.poses[m]) for m in others
+        ]
+        agree = sum(e.agree for e in evidence)
+        violated = sum(e.front + 0.5 * e.contradict for e in evidence)
+        if violated > problem.config.max_violated_share * agree:
+            doubts[k] = (
+                f"other sensors saw through its surface ({violated / max(agree, 1e-9):.0%} of what "
+                "agrees)"
+            )
+        elif not any(k in edge for edge in accepted):
+            doubts[k] = "no single pair confirms its pose"
+    shut_out = [
+        edge
+        for edge, result in problem.pairs.items()
+        if result.kind is PairKind.GOOD
+        and edge not in accepted
+        and edge[0] in component.poses
+        and edge[1] in component.poses
+    ]
+    for edge in shut_out:
+        for k in edge:
+            doubts.setdefault(k, "a good pair disagrees with its pose")
+    return doubts
+

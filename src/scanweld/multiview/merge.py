@@ -1,0 +1,186 @@
+"""Ways to lay one component of placed scans onto another, and what all their scans say of it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT, Evidence, PairKind, PairResult
+
+Judge = Callable[[int, int, Pose], Evidence]
+"""Mean evidence of both directions on scans i and j at a pose ``i_from_j`` of their sensors."""
+Poses = Mapping[int, Pose]
+"""component_from_sensor of a component's scans."""
+
+MIN_CANDIDATE_SCORE = -0.25
+"""Alternatives scored below this propose nothing."""
+MAX_JUDGED = 12
+"""Distinct ways to merge two components that are judged, those with most support first."""
+FREE_SHARE = 0.1
+"""Weight of free space when many pairs speak: real silhouettes have gaps, surfaces do not."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Support:
+    """A pair's alternative that proposes a merge: scan i of the first component, j of the second.
+
+    Attributes:
+        i: Scan of the first component.
+        j: Scan of the second.
+        rank: Of the alternative in the pair's result, 0 for the best.
+        score: Its score.
+        agree: Share of the samples that agree in it.
+        is_good: Whether it is the best of a good pair.
+    """
+
+    i: int
+    j: int
+    rank: int
+    score: float
+    agree: float
+    is_good: bool
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Merge:
+    """One way to lay component b onto component a, judged by every pair across.
+
+    Attributes:
+        a_from_b: The motion between the components' frames.
+        supports: The alternatives that propose it, strongest first, one a pair.
+        agree: Sum over the pairs across of the shares of samples that agree,
+        violated: that lie before the other's surface or contradict it,
+        free: that lie in the other's free space.
+        worst: Largest excess of violation over agreement of any single pair across.
+        margin: Share of the score by which it beats its best distinct rival.
+    """
+
+    a_from_b: Pose
+    supports: tuple[Support, ...]
+    agree: float
+    violated: float
+    free: float
+    worst: float
+    margin: float = 1.0
+
+    @property
+    def score(self) -> float:
+        """Agreement less weighted violations, summed over the pairs across."""
+        return self.agree - VIOLATION_WEIGHT * self.violated - FREE_SHARE * self.free
+
+
+def propose_merges(
+    a: Poses,
+    b: Poses,
+    pairs: Mapping[tuple[int, int], PairResult],
+    centres: Sequence[FloatArray],
+    near: tuple[float, float],
+    judge: Judge,
+    banned: frozenset[tuple[int, int, int]] = frozenset(),
+) -> list[Merge]:
+    """Distinct ways to merge two components, best first, each with its margin over the next.
+
+    Args:
+        a: First component.
+        b: Second component.
+        pairs: Results of all pairs, by i < j.
+        centres: (3,) middle of each scan's samples, sensor frame.
+        near: Angle in degrees and shift within which two proposals are the same.
+        judge: Gives the evidence on any pair at any pose.
+        banned: Alternatives (i, j, rank), i < j, that may not propose.
+    """
+    proposals = _proposals(a, b, pairs, banned)
+    middle = np.mean([b[j].apply(centres[j]) for j in sorted(b)], axis=0)
+    clusters = _cluster(proposals, middle, near)[:MAX_JUDGED]
+    merges = [_judged(a, b, motion, supports, judge) for motion, supports in clusters]
+    merges.sort(key=lambda merge: -merge.score)
+    return [_with_margin(merge, merges) for merge in merges]
+
+
+def _proposals(
+    a: Poses,
+    b: Poses,
+    pairs: Mapping[tuple[int, int], PairResult],
+    banned: frozenset[tuple[int, int, int]],
+) -> list[tuple[Pose, Support]]:
+    found = []
+    for i in sorted(a):
+        for j in sorted(b):
+            result = pairs.get((min(i, j), max(i, j)))
+            for rank, option in enumerate(result.alternatives if result else ()):
+                is_banned = (min(i, j), max(i, j), rank) in banned
+                if is_banned or option.score < MIN_CANDIDATE_SCORE:
+                    continue
+                i_from_j = option.i_from_j if i < j else option.i_from_j.inverse()
+                is_good = rank == 0 and result is not None and result.kind is PairKind.GOOD
+                support = Support(
+                    i=i,
+                    j=j,
+                    rank=rank,
+                    score=option.score,
+                    agree=option.evidence.agree,
+                    is_good=is_good,
+                )
+                found.append((a[i] @ i_from_j @ b[j].inverse(), support))
+    found.sort(key=lambda proposal: -proposal[1].score)
+    return found
+
+
+def _cluster(
+    proposals: list[tuple[Pose, Support]], middle: FloatArray, near: tuple[float, float]
+) -> list[tuple[Pose, tuple[Support, ...]]]:
+    """Proposals near a stronger one support it; clusters with most support first."""
+    heads: list[tuple[Pose, list[Support]]] = []
+    for motion, support in proposals:
+        for head, supports in heads:
+            if is_near(head, motion, middle, near):
+                if all((s.i, s.j) != (support.i, support.j) for s in supports):
+                    supports.append(support)
+                break
+        else:
+            heads.append((motion, [support]))
+    heads.sort(key=lambda cluster: -sum(s.score - MIN_CANDIDATE_SCORE for s in cluster[1]))
+    return [(motion, tuple(supports)) for motion, supports in heads]
+
+
+def is_near(p: Pose, q: Pose, middle: FloatArray, near: tuple[float, float]) -> bool:
+    """Whether two motions differ by less than an angle (degrees) and a shift of the middle."""
+    apart = p.inverse() @ q
+    return apart.shift_at(middle) < near[1] and apart.angle_deg() < near[0]
+
+
+def _judged(
+    a: Poses, b: Poses, a_from_b: Pose, supports: tuple[Support, ...], judge: Judge
+) -> Merge:
+    evidence = [
+        judge(i, j, a[i].inverse() @ a_from_b @ b[j]) for i in sorted(a) for j in sorted(b)
+    ]
+    violated = [e.front + CONTRADICT_WEIGHT / VIOLATION_WEIGHT * e.contradict for e in evidence]
+    return Merge(
+        a_from_b=a_from_b,
+        supports=supports,
+        agree=sum(e.agree for e in evidence),
+        violated=sum(violated),
+        free=sum(e.free for e in evidence),
+        worst=max(v - 0.5 * e.agree for v, e in zip(violated, evidence, strict=True)),
+    )
+
+
+def _with_margin(merge: Merge, merges: Sequence[Merge]) -> Merge:
+    rivals = [other.score for other in merges if other is not merge]
+    margin = 1.0
+    if merge.score <= 0:
+        margin = 0.0
+    elif rivals:
+        margin = min(1.0, (merge.score - max(rivals)) / merge.score)
+    return Merge(
+        a_from_b=merge.a_from_b,
+        supports=merge.supports,
+        agree=merge.agree,
+        violated=merge.violated,
+        free=merge.free,
+        worst=merge.worst,
+        margin=margin,
+    )

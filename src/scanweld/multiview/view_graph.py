@@ -1,0 +1,47 @@
+"""The view graph: which pairs hold, which scans they place, and why the rest stay out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.result import Alternative, PairResult
+
+Edge = tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Component:
+    """Scans that are placed together.
+
+    Attributes:
+        poses: component_from_sensor of each scan, the reference scan's the identity.
+        reference: The best-supported scan.
+    """
+
+    poses: Mapping[int, Pose]
+    reference: int
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class ViewGraph:
+    """Pairs that agree with each other, and the components they make.
+
+    Attributes:
+        pairs: Results of all pairs (i, j), i < j.
+        accepted: The alternative of each pair that agrees with the poses.
+        rejected: Why the other pairs are not used.
+        components: Of at least two scans, largest first.
+        unplaced: Why the other scans are in none.
+        doubts: What speaks against a placed scan, in words.
+    """
+
+    pairs: Mapping[Edge, PairResult]
+    accepted: Mapping[Edge, Alternative]
+    rejected: Mapping[Edge, str]
+    components: tuple[Component, ...]
+    unplaced: Mapping[int, str]
+    doubts: Mapping[int, str]
+
+    def neighbours(self, scan: int) -> tuple[int, ...]:
+        """Scans that share an accepted pair with one, in order."""
+        return tuple(sorted({i + j - scan for i, j in self.accepted if scan in (i, j)}))
