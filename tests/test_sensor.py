@@ -1,0 +1,282 @@
+"""Where the sensor stood: exact cameras on rendered grids, directions and sides on real scans."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scanweld.errors import InputError
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
+from scanweld.io import read_scan
+from scanweld.prepare.resolution import point_spacing
+from scanweld.prepare.sensor import locate_sensor
+from tests.data import require_data
+
+PINHOLE = Camera(
+    model=CameraModel.PINHOLE, width=200, height=160, fx=220.0, fy=200.0, cx=95.0, cy=83.0
+)
+ORTHOGRAPHIC = Camera(
+    model=CameraModel.ORTHOGRAPHIC, width=200, height=160, fx=50.0, fy=40.0, cx=95.0, cy=83.0
+)
+MIRRORS = {
+    "as seen": lambda grid: grid,
+    "rows up": lambda grid: grid[::-1],
+    "columns leftwards": lambda grid: grid[:, ::-1],
+    "upside down": lambda grid: grid[::-1, ::-1],
+    "transposed": lambda grid: grid.T,
+}
+BUNNY = [
+    f"stanford-bunny/{name}.ply"
+    for name in (
+        *("bun000", "bun045", "bun090", "bun180", "bun270", "bun315"),
+        *("chin", "ear_back", "top2", "top3"),
+    )
+]
+DRAGON = [f"stanford-dragon/dragonStandRight_{angle}.ply" for angle in range(0, 360, 24)]
+
+
+def lumpy_depth(x: FloatArray, y: FloatArray) -> FloatArray:
+    """A lumpy ellipsoid about (0.1, 0, 5), as depth over the ray's x/z, y/z or x, y."""
+    with np.errstate(invalid="ignore"):
+        bulge = np.sqrt(1 - ((x - 0.1) / 1.2) ** 2 - (y / 0.95) ** 2)
+    return 5 - bulge + 0.06 * np.sin(6 * x) * np.cos(5 * y + 1)
+
+
+def render(camera: Camera) -> FloatArray:
+    """Points (H, W, 3) that the camera sees of the lumpy body, NaN beside it."""
+    rows, columns = np.mgrid[: camera.height, : camera.width].astype(float)
+    reach = 1.0 if camera.model is CameraModel.ORTHOGRAPHIC else 4.5
+    x = reach * (columns - camera.cx) / camera.fx
+    y = reach * (rows - camera.cy) / camera.fy
+    return camera.unproject_image(lumpy_depth(x, y))
+
+
+def organised(image: FloatArray, pose: Pose, name: str = "body") -> RangeScan:
+    """A scan with a grid from an image (H, W, 3) of points in the sensor frame."""
+    seen = np.isfinite(image[..., 2])
+    grid = np.full(seen.shape, -1)
+    grid[seen] = np.arange(seen.sum())
+    return RangeScan(name=name, points=pose.apply(image[seen]), grid=grid)
+
+
+def any_pose(seed: int) -> Pose:
+    rng = np.random.default_rng(seed)
+    return Pose(rotation=random_rotation(rng), translation=rng.normal(scale=20, size=3))
+
+
+def moved(scan: RangeScan, pose: Pose) -> RangeScan:
+    return replace(scan, points=pose.apply(scan.points))
+
+
+def viewing(scan: RangeScan) -> FloatArray:
+    """The viewing direction that was found, in the scan frame."""
+    assert scan.scan_from_sensor is not None
+    return scan.scan_from_sensor.rotation[:, 2]
+
+
+def angle_deg(a: FloatArray, b: FloatArray) -> float:
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
+
+
+def grid_faces(grid: IntArray) -> IntArray:
+    """Two faces a cell, counter-clockwise from the sensor if rows go down and columns right."""
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[:-1, 1:], grid[1:, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([c, b, d], -1)]).reshape(-1, 3)
+    return faces[(faces >= 0).all(axis=1)]
+
+
+@pytest.mark.parametrize("mirror", MIRRORS)
+@pytest.mark.parametrize("camera", [PINHOLE, ORTHOGRAPHIC], ids=["pinhole", "orthographic"])
+def test_camera_behind_a_grid_is_recovered(camera: Camera, mirror: str):
+    pose = any_pose(len(mirror))
+    scan = organised(render(camera), pose)
+    assert scan.grid is not None
+    found = locate_sensor(replace(scan, grid=MIRRORS[mirror](scan.grid)))
+    assert found.viewpoint is Viewpoint.FITTED and found.grid is not None
+    assert found.camera is not None and found.camera.model is camera.model
+    assert (found.camera.height, found.camera.width) == found.grid.shape
+    assert found.scan_from_sensor is not None
+    rows, columns = np.nonzero(found.grid >= 0)
+    in_sensor = found.scan_from_sensor.inverse().apply(found.points[found.grid[rows, columns]])
+    pixels, depth = found.camera.project(in_sensor)
+    assert np.abs(pixels - np.stack([columns, rows], axis=1)).max() < 1e-6
+    assert depth.min() > 0
+    assert angle_deg(viewing(found), pose.rotation[:, 2]) < 1e-5
+    if camera.model is CameraModel.PINHOLE:
+        assert np.allclose(found.scan_from_sensor.translation, pose.translation, atol=1e-6)
+        assert sorted([found.camera.fx, found.camera.fy]) == pytest.approx([200, 220], abs=1e-5)
+
+
+def test_pinhole_survives_single_precision_and_a_little_noise():
+    scan = organised(render(PINHOLE), pose := any_pose(3))
+    noise = np.random.default_rng(0).normal(scale=1e-3, size=scan.points.shape)
+    found = locate_sensor(replace(scan, points=(scan.points + noise).astype(np.float32)))
+    assert found.scan_from_sensor is not None and found.camera is not None
+    shift = found.scan_from_sensor.translation - pose.translation
+    assert np.linalg.norm(shift) < 0.01 * 5
+    assert found.camera.fx == pytest.approx(220, rel=0.01)
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 1000), scale=st.sampled_from([1e-3, 1.0, 1e4]))
+def test_side_of_an_orthographic_grid_does_not_depend_on_frame_or_unit(seed: int, scale: float):
+    pose = any_pose(seed)
+    scan = organised(render(ORTHOGRAPHIC), pose)
+    found = locate_sensor(replace(scan, points=scale * scan.points))
+    assert angle_deg(viewing(found), pose.rotation[:, 2]) < 1e-5
+    assert found.camera is not None
+    assert found.camera.fx == pytest.approx(50 / scale)
+
+
+@pytest.mark.parametrize("oblique_deg", [0.0, 28.0])
+def test_line_scanner_is_seen_along_its_fan(oblique_deg: float):
+    """Columns step along x, seen obliquely or not; rows fan out from the line y = 0, z = 0."""
+    rows, columns = np.mgrid[:160, :200].astype(float)
+    x, y = (columns - 95) / 50, (rows - 83) / 40
+    z = lumpy_depth(x, y)
+    image = np.stack([x + np.tan(np.radians(oblique_deg)) * (z - 5), y * z / 5, z], axis=-1)
+    scan = organised(image, pose := any_pose(7))
+    found = locate_sensor(scan)
+    centre = pose.inverse().apply(scan.points.mean(axis=0))
+    truth = np.array([np.tan(np.radians(oblique_deg / 2)), centre[1] / centre[2], 1.0])
+    assert found.camera is None and found.viewpoint is Viewpoint.FITTED
+    assert angle_deg(viewing(found), pose.turn(truth)) < 1.0
+    assert any("halfway" in note for note in found.notes) == (oblique_deg > 0)
+
+
+@pytest.mark.parametrize("path", BUNNY + DRAGON)
+def test_real_grids_give_the_viewing_direction_in_any_frame(path: str):
+    """Truth: -z of the file; the bunny's rays lean by 3.4 deg, the dragon's camera by 28 deg."""
+    scan = read_scan(require_data(path))
+    found = locate_sensor(scan)
+    assert angle_deg(viewing(found), np.array([0, 0, -1.0])) < (4 if path in BUNNY else 18)
+    assert found.viewpoint is Viewpoint.FITTED
+    assert found.scan_from_sensor is not None
+    assert found.scan_from_sensor.inverse().apply(scan.points)[:, 2].min() > 0
+    pose = any_pose(len(scan.points))
+    turned = locate_sensor(moved(scan, pose))
+    assert np.abs(viewing(turned) - pose.turn(viewing(found))).max() < 1e-6
+
+
+@pytest.mark.parametrize("path", [BUNNY[0], BUNNY[6], DRAGON[0], DRAGON[9]])
+def test_viewpoint_of_bare_points_is_estimated(path: str):
+    scan = replace(read_scan(require_data(path)), grid=None)
+    truth = np.array([-0.24 if path in DRAGON else 0, -0.06, -1])
+    pose = any_pose(len(scan.points))
+    found = locate_sensor(moved(scan, pose))
+    assert found.viewpoint is Viewpoint.ESTIMATED and "estimated" in " ".join(found.notes)
+    assert angle_deg(viewing(found), pose.turn(truth)) < 15
+
+
+def test_estimate_turns_with_the_points_and_ignores_the_unit():
+    image = render(PINHOLE)
+    scan = replace(organised(image, Pose.identity()), grid=None)
+    pose = any_pose(5)
+    found = locate_sensor(scan)
+    turned = locate_sensor(replace(scan, points=1e3 * pose.apply(scan.points)))
+    assert angle_deg(viewing(found), np.array([0, 0, 1.0])) < 10
+    assert angle_deg(viewing(turned), pose.turn(viewing(found))) < 1.0
+
+
+def test_winding_of_an_open_mesh_tells_the_side():
+    """A hollow bowl falls off the wrong way; its winding knows better, and the doubt is told."""
+    scan = organised(render(ORTHOGRAPHIC), pose := any_pose(11))
+    assert scan.grid is not None
+    faces = grid_faces(scan.grid)
+    front = locate_sensor(replace(scan, grid=None, faces=faces))
+    hollow = locate_sensor(replace(scan, grid=None, faces=faces[:, ::-1]))
+    assert angle_deg(viewing(front), pose.rotation[:, 2]) < 10
+    assert angle_deg(viewing(hollow), -pose.rotation[:, 2]) < 10
+    assert any("contradict" in note for note in hollow.notes)
+    assert not any("contradict" in note for note in front.notes)
+
+
+def test_normals_of_the_file_tell_the_side():
+    scan = organised(render(ORTHOGRAPHIC), pose := any_pose(12))
+    normals = np.tile(pose.rotation[:, 2], (len(scan.points), 1))
+    found = locate_sensor(replace(scan, grid=None, normals=normals))
+    assert angle_deg(viewing(found), -pose.rotation[:, 2]) < 10
+
+
+def test_complete_model_is_called_one():
+    rng = np.random.default_rng(0)
+    sphere = rng.normal(size=(4000, 3)) * (1.0, 1.2, 0.8)
+    sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
+    found = locate_sensor(RangeScan(name="sphere", points=sphere))
+    assert any("complete model" in note for note in found.notes)
+
+
+def test_flat_scan_is_seen_squarely_and_its_side_called_a_guess():
+    rows, columns = np.mgrid[:60, :80].astype(float)
+    image = np.stack([columns, rows, np.zeros_like(rows)], axis=-1)
+    scan = organised(image, pose := any_pose(2))
+    for flat in (scan, replace(scan, grid=None)):
+        found = locate_sensor(flat)
+        tilt = angle_deg(viewing(found), pose.rotation[:, 2])
+        assert min(tilt, 180 - tilt) < 2
+        assert any("guess" in note for note in found.notes)
+
+
+def test_grid_that_does_not_fit_its_points_is_not_believed():
+    scan = organised(render(PINHOLE), pose := any_pose(4))
+    assert scan.grid is not None
+    grid = scan.grid.copy()
+    grid[grid >= 0] = np.random.default_rng(0).permutation(grid[grid >= 0])
+    found = locate_sensor(replace(scan, grid=grid))
+    assert found.viewpoint is Viewpoint.ESTIMATED and found.camera is None
+    assert angle_deg(viewing(found), pose.rotation[:, 2]) < 10
+
+
+def test_given_sensor_is_kept():
+    given_scan = replace(
+        organised(render(PINHOLE), Pose.identity()),
+        camera=PINHOLE,
+        scan_from_sensor=Pose.identity(),
+        viewpoint=Viewpoint.GIVEN,
+    )
+    assert locate_sensor(given_scan) is given_scan
+
+
+@pytest.mark.parametrize("has_grid", [True, False])
+def test_camera_without_a_pose_holds_only_where_the_points_fit_it(has_grid: bool):
+    scan = replace(organised(render(PINHOLE), Pose.identity()), camera=PINHOLE)
+    scan = scan if has_grid else replace(scan, grid=None)
+    at_home = locate_sensor(scan)
+    assert at_home.camera == PINHOLE and at_home.scan_from_sensor is not None
+    assert np.array_equal(at_home.scan_from_sensor.matrix(), np.eye(4))
+    pose = any_pose(9)
+    away = locate_sensor(moved(scan, pose))
+    assert angle_deg(viewing(away), pose.rotation[:, 2]) < (1e-5 if has_grid else 10)
+    assert (away.camera is not None) == has_grid
+
+
+def test_what_is_no_surface_is_refused():
+    points = np.random.default_rng(0).normal(size=(10, 3))
+    with pytest.raises(InputError, match="few: a scan of 10 points"):
+        locate_sensor(RangeScan(name="few", points=points))
+    line = np.linspace(0, 1, 100)[:, None] * np.array([1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="one line"):
+        locate_sensor(RangeScan(name="line", points=line))
+    with pytest.raises(InputError, match="one line"):
+        locate_sensor(RangeScan(name="dot", points=np.ones((100, 3))))
+
+
+def test_sensor_without_a_camera_stands_well_before_the_object():
+    scan = replace(organised(render(PINHOLE), any_pose(6)), grid=None)
+    found = locate_sensor(scan)
+    assert found.scan_from_sensor is not None
+    distance = np.linalg.norm(found.scan_from_sensor.translation - scan.points.mean(axis=0))
+    assert distance == pytest.approx(2 * principal_diameter(scan.points))
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e5])
+def test_point_spacing_of_a_lattice(scale: float):
+    rows, columns = np.mgrid[:70, :90].astype(float)
+    lattice = scale * np.stack([columns.ravel(), 3 * rows.ravel(), 0 * rows.ravel()], axis=1)
+    assert point_spacing(lattice) == pytest.approx(scale)
+    assert point_spacing(np.repeat(lattice, 2, axis=0)) == pytest.approx(scale)
