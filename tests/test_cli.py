@@ -1,0 +1,320 @@
+"""The command line as users meet it: exit codes, streams, and what is left on disk."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scanweld.app import job
+from scanweld.app.cli import main
+from scanweld.app.workspace import work_folder
+from scanweld.errors import InputError
+from scanweld.evaluation.scanner import scan_mesh
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.pose import Pose
+from scanweld.io import PoseSet, write_mesh_ply, write_poses
+from scanweld.io.ply_write import write_scan_ply
+from tests.results import a_result, stub_run, turned
+from tests.scenes import PRIMITIVES
+
+
+@pytest.fixture(autouse=True)
+def stubbed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(job.pipeline, "run", stub_run)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def scan_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    mesh = PRIMITIVES["box"]()
+    view = view_of(mesh, 30, 25, pixels=40)
+    path = tmp_path_factory.mktemp("scan") / "box.ply"
+    write_scan_ply(path, scan_mesh(mesh, view.camera, view.world_from_sensor))
+    return path
+
+
+@pytest.fixture
+def scans(scan_file: Path, tmp_path: Path) -> Path:
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    for name in ("a", "b", "c"):
+        shutil.copy(scan_file, folder / f"{name}.ply")
+    return folder
+
+
+def scanweld(*arguments: str | Path) -> int:
+    with pytest.raises(SystemExit) as left:
+        main([str(argument) for argument in arguments])
+    assert isinstance(left.value.code, int)
+    return left.value.code
+
+
+def error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line on stderr, after nothing on stdout."""
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    assert line.startswith("scanweld: error: ")
+    return line
+
+
+def fail_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*arguments: Any, **settings: Any) -> None:
+        stub_run(*arguments, **settings)
+        raise error
+
+    monkeypatch.setattr(job.pipeline, "run", run)
+
+
+def test_run_writes_the_output_and_a_summary(scans: Path, capsys: pytest.CaptureFixture[str]):
+    assert scanweld("run", scans, "-o", "model") == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("good: all 3 scans are placed") and "model.ply" in out
+    assert "error" not in err
+    assert sorted(path.name for path in Path("model").iterdir()) == [
+        "config.toml",
+        "graph.json",
+        "model.ply",
+        "poses.json",
+        "report.json",
+    ]
+    assert not work_folder(Path("model")).exists()
+
+
+def test_files_patterns_and_folders_are_the_same(scans: Path):
+    files = [scans / f"{name}.ply" for name in "cab"]
+    for k, inputs in enumerate(([scans], files, [scans / "*.ply"], [scans, files[0]])):
+        assert scanweld("run", *inputs, "-o", f"m{k}") == 0
+        assert Path(f"m{k}/poses.json").read_bytes() == Path("m0/poses.json").read_bytes()
+
+
+def test_options_reach_the_settings(scans: Path, monkeypatch: pytest.MonkeyPatch):
+    seen: dict[str, Any] = {}
+
+    def run(*arguments: Any, **settings: Any) -> object:
+        seen.update(settings)
+        return stub_run(*arguments, **settings)
+
+    monkeypatch.setattr(job.pipeline, "run", run)
+    Path("my.toml").write_text("seed = 3\n[pairs]\nnum_turns = 36\n")
+    options = ["--config", "my.toml", "--seed", "5", "--unit", "mm", "--workers", "2"]
+    assert scanweld("run", scans, "-o", "model", *options) == 0
+    settings = json.loads(Path("model/report.json").read_text())["settings"]
+    assert (settings["seed"], settings["unit"], settings["pairs"]["num_turns"]) == (5, "mm", 36)
+    assert seen["workers"] == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["run"],
+        ["run", "scans"],
+        ["run", "-o", "model"],
+        ["run", "scans", "-o", "model", "--nonsense"],
+        ["run", "scans", "-o", "model", "--workers", "0"],
+        ["run", "scans", "-o", "model", "--workers", "two"],
+        ["run", "scans", "-o", "model", "--seed", "-1"],
+        ["run", "scans", "-o", "model", "--unit", "foo"],
+        ["nonsense"],
+        ["info"],
+        ["simulate", "mesh.ply"],
+        ["simulate", "mesh.ply", "-o", "out", "--camera", "fisheye"],
+        ["simulate", "mesh.ply", "-o", "out", "--num-scans", "1"],
+        ["evaluate", "poses.json"],
+    ],
+)
+def test_usage_errors_exit_with_2(
+    scans: Path, arguments: list[str], capsys: pytest.CaptureFixture[str]
+):
+    assert scanweld(*arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and "Error" in err and "Traceback" not in err
+    assert [path.name for path in Path().iterdir()] == ["scans"]
+
+
+def test_version_and_help(capsys: pytest.CaptureFixture[str]):
+    assert scanweld("--version") == 0
+    assert capsys.readouterr().out.startswith("scanweld 0.")
+    assert scanweld("run", "--help") == 0
+    assert "--force" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("inputs", "says"),
+    [
+        (["scans", "missing.ply"], r"missing.ply: there is no such file"),
+        (["empty"], r"empty: the folder holds no scans"),
+        (["scans/*.xyz"], r"scans/\*.xyz: the pattern holds no scans"),
+        (["notes.md"], r"notes.md: unknown format"),
+        (["scans/a.ply"], r"only 1 of the scans"),
+        (["scans/a.ply", "broken.ply"], r"only 1 of the scans"),
+        (["scans", "--config", "missing.toml"], r"missing.toml: cannot be read"),
+        (["scans", "--config", "bad.toml"], r"bad.toml: pairs.num_turn: Extra inputs"),
+        (["scans", "--config", "odd.toml"], r"odd.toml: seed: "),
+        (["scans", "-o", "scans"], r"scans: (is not empty|holds the input)"),
+        (["scans", "-o", "scans", "--force"], r"scans: holds the input a.ply"),
+        (["scans", "-o", "notes.md"], r"notes.md: is not a folder"),
+        (["scans", "-o", "full"], r"full: is not empty.*--force"),
+        (["scans", "-o", "/proc/nowhere"], r"/proc/nowhere: cannot be written"),
+    ],
+)
+def test_bad_input_exits_with_1_one_line_and_nothing_written(
+    scans: Path, inputs: list[str], says: str, capsys: pytest.CaptureFixture[str]
+):
+    for folder in ("empty", "full"):
+        Path(folder).mkdir()
+    for name in ("notes.md", "broken.ply", "full/file"):
+        Path(name).write_text("not a scan")
+    Path("bad.toml").write_text("[pairs]\nnum_turn = 3\n")
+    Path("odd.toml").write_text("seed = -3\n")
+    before = sorted(Path().rglob("*"))
+    output = [] if "-o" in inputs else ["-o", "model"]
+    assert scanweld("run", "-q", *inputs, *output) == 1
+    assert re.search(says, error_line(capsys))
+    assert sorted(Path().rglob("*")) == before
+
+
+def test_unreadable_files_are_named_while_the_rest_goes_on(
+    scans: Path, capsys: pytest.CaptureFixture[str]
+):
+    whole = (scans / "a.ply").read_bytes()
+    (scans / "empty.ply").write_bytes(b"")
+    (scans / "text.ply").write_text("dear diary")
+    (scans / "truncated.ply").write_bytes(whole[: len(whole) // 2])
+    assert scanweld("run", scans, "-o", "model") == 3
+    out = capsys.readouterr().out
+    poses = json.loads(Path("model/poses.json").read_text())
+    assert list(poses["scans"]) == ["a", "b", "c"]
+    assert list(poses["unplaced"]) == ["empty", "text", "truncated"]
+    for name, reason in poses["unplaced"].items():
+        assert f"unplaced {name}: {reason}" in out
+    report = json.loads(Path("model/report.json").read_text())
+    assert (report["verdict"], report["exit_code"]) == ("partial", 3)
+
+
+def test_same_stem_twice_gives_relative_paths(scans: Path):
+    for name in ("left", "right"):
+        (scans / name).mkdir()
+        shutil.move(scans / f"{'a' if name == 'left' else 'b'}.ply", scans / name / "s.ply")
+    assert scanweld("run", scans / "left", scans / "right", "-o", "model") == 0
+    assert list(json.loads(Path("model/poses.json").read_text())["scans"]) == ["left/s", "right/s"]
+
+
+def test_force_replaces_and_its_absence_refuses(scans: Path):
+    assert scanweld("run", scans, "-o", "model") == 0
+    Path("model/old").write_text("old")
+    assert scanweld("run", scans, "-o", "model") == 1
+    assert Path("model/old").exists()
+    assert scanweld("run", scans, "-o", "model", "--force") == 0
+    assert not Path("model/old").exists()
+
+
+def test_interruption_exits_with_130_and_a_rerun_continues(
+    scans: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    fail_with(KeyboardInterrupt(), monkeypatch)
+    assert scanweld("run", scans, "-o", "model", "-q") == 130
+    err = capsys.readouterr().err
+    assert err.startswith("scanweld: interrupted; the same command goes on from ")
+    assert len(err.splitlines()) == 1
+    assert not Path("model").exists() and work_folder(Path("model")).exists()
+    monkeypatch.setattr(job.pipeline, "run", stub_run)
+    assert scanweld("run", scans, "-o", "model") == 0
+    assert not work_folder(Path("model")).exists()
+
+
+def test_failing_run_leaves_an_earlier_output_whole(scans: Path, monkeypatch: pytest.MonkeyPatch):
+    assert scanweld("run", scans, "-o", "model") == 0
+    before = {path.name: path.read_bytes() for path in Path("model").iterdir()}
+    for error, code in ((InputError("too little"), 1), (KeyboardInterrupt(), 130)):
+        fail_with(error, monkeypatch)
+        assert scanweld("run", scans, "-o", "model", "--force") == code
+        assert {path.name: path.read_bytes() for path in Path("model").iterdir()} == before
+
+
+def test_crash_is_no_success(scans: Path, monkeypatch: pytest.MonkeyPatch):
+    fail_with(ZeroDivisionError("a bug"), monkeypatch)
+    with pytest.raises(ZeroDivisionError):
+        main(["run", str(scans), "-o", "model"])
+    assert not Path("model").exists()
+
+
+def test_quiet_run_says_nothing_on_stderr(scans: Path, capsys: pytest.CaptureFixture[str]):
+    assert scanweld("run", scans, "-o", "model", "-q") == 0
+    out, err = capsys.readouterr()
+    assert out and err == ""
+
+
+def test_info_shows_what_was_read(scans: Path, capsys: pytest.CaptureFixture[str]):
+    assert scanweld("info", scans / "a.ply", scans / "b.ply") == 0
+    out = capsys.readouterr().out
+    for word in ("a\n", "b\n", "points", "grid", "camera     pinhole", "viewpoint  given"):
+        assert word in out
+    assert "resolution" in out and "diameter" in out
+
+
+def test_info_names_the_broken_file_and_shows_the_others(
+    scans: Path, capsys: pytest.CaptureFixture[str]
+):
+    (scans / "broken.ply").write_text("not a scan")
+    assert scanweld("info", scans) == 1
+    out, err = capsys.readouterr()
+    assert [line for line in out.splitlines() if not line.startswith(" ")] == ["a", "b", "c"]
+    assert err.startswith("scanweld: error: ") and "broken.ply" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_simulate_then_evaluate(capsys: pytest.CaptureFixture[str]):
+    write_mesh_ply("box.ply", PRIMITIVES["box"]())
+    options = ["--num-scans", "3", "--pixels", "40", "--noise", "0", "--camera", "orthographic"]
+    assert scanweld("simulate", "box.ply", "-o", "sim", *options) == 0
+    assert sorted(path.name for path in Path("sim").glob("*.ply")) == [
+        "scan_01.ply",
+        "scan_02.ply",
+        "scan_03.ply",
+    ]
+    truth = Path("sim/truth/poses.json")
+    capsys.readouterr()
+    assert scanweld("evaluate", truth, truth, "--scans", "sim") == 0
+    out = capsys.readouterr().out
+    assert "of 3 scans: 3 right, 0 wrong, 0 unplaced" in out
+    assert "translation error, mean / max: 0.000 / 0.000 % of the diameter" in out
+    assert scanweld("simulate", "box.ply", "-o", "sim", *options) == 1
+
+
+def test_evaluate_finds_what_is_wrong(capsys: pytest.CaptureFixture[str]):
+    truth = {name: turned(k) for k, name in enumerate(("a", "b", "c"))}
+    off = Pose.exp([0, 0, np.radians(10), 0, 0, 0])
+    found = {"a": truth["a"], "b": truth["b"] @ off}
+    Path("truth.json").write_text(
+        json.dumps({name: pose.matrix().tolist() for name, pose in truth.items()})
+    )
+    estimate = PoseSet(poses=found, components=(("a", "b"),), unplaced={"c": "fits nowhere"})
+    write_poses("poses.json", estimate)
+    assert scanweld("evaluate", "poses.json", "truth.json") == 3
+    out = capsys.readouterr().out
+    assert "of 3 scans: 1 right, 1 wrong, 1 unplaced" in out and "/ 10.000 deg" in out
+    assert scanweld("evaluate", "poses.json", "missing.json") == 1
+    assert "missing.json" in error_line(capsys)
+
+
+def test_evaluate_needs_every_placed_scan(scans: Path, capsys: pytest.CaptureFixture[str]):
+    poses = a_result(["a", "elsewhere"]).poses
+    write_poses("poses.json", PoseSet(poses=dict(poses), components=(tuple(poses),)))
+    assert scanweld("evaluate", "poses.json", "poses.json", "--scans", scans) == 1
+    assert "elsewhere" in error_line(capsys)
+
+
+def test_installed_command_leaves_with_its_exit_code():
+    command = [sys.executable, "-c", "from scanweld.app.cli import main; main()", "run", "nowhere"]
+    done = subprocess.run([*command, "-o", "model"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr == "scanweld: error: nowhere: there is no such file; check the path\n"
