@@ -18,7 +18,7 @@ _RIM_WEIGHT = 0.05
 """Weight of a pixel on the rim, where sensors mix near and far."""
 _RAMP_PIXELS = 6.0
 """Distance from the rim at which a pixel has its full weight."""
-_FREE_PIXELS = 3.0
+_FREE_PIXELS = 10.0
 """Free pixels nearer to the silhouette do not carve."""
 _MAX_LOST = 0.02
 """An image on whose free pixels lies this share of another scan's surface does not carve there."""

@@ -22,10 +22,10 @@ VoxelArray = NDArray[np.float32]
 BLOCK = 8
 """Voxels along the edge of a block."""
 _KEY_BITS = 20
-_CARVE_RATIO = 0.5
+_CARVE_RATIO = 1.0
 """A voxel is empty where free space weighs more than this share of its surface's weight."""
-_FULL_DEPTH = 1.25
-"""Weights fall to nothing at the truncation behind a surface, from one over this before it."""
+_DEPTH_VOXELS = 2.0
+"""Weights fall to nothing this far behind a surface: no cell that it crosses reaches deeper."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -56,9 +56,10 @@ class Volume:
     def mean_distance(self) -> VoxelArray:
         """(B, 8, 8, 8) signed distances over the truncation.
 
-        NaN where no surface was measured nearby, or free space speaks against it.
+        NaN where no surface was measured nearby, or where a voxel behind one is empty space.
         """
-        is_seen = (self.weight > 0) & (self.empty <= _CARVE_RATIO * self.weight)
+        is_solid = self.empty <= _CARVE_RATIO * self.weight
+        is_seen = (self.weight > 0) & ((self.distance >= 0) | is_solid)
         mean = np.full(self.weight.shape, np.nan, np.float32)
         return np.divide(self.distance, self.weight, out=mean, where=is_seen)
 
@@ -153,6 +154,7 @@ def _integrate_image(
     """Add one image: all voxels of all blocks that project into it."""
     m, size = sensor_from_world, distance.shape[1]
     height, width = carving.shape
+    depth = _DEPTH_VOXELS * voxel / truncation
     for block, i, j, k in np.ndindex(distance.shape):
         x = origin[0] + voxel * (blocks[block, 0] * size + i)
         y = origin[1] + voxel * (blocks[block, 1] * size + j)
@@ -174,12 +176,12 @@ def _integrate_image(
             d = _plane_distance(points, normals, row, column, x, y, z)
         if d > truncation:
             empty[block, i, j, k] += carving[row, column]
-        elif d >= -truncation:
+        elif d > -depth * truncation:
             if not is_rim[row, column]:
                 d, w = _smooth_distance(points, normals, pixel_weight, u, v, x, y, z)
             d = min(max(d / truncation, -1.0), 1.0)
             # What is deep behind one surface may be just before another, as in a thin wall.
-            w *= min(1.0, _FULL_DEPTH * (1.0 + d))
+            w *= min(1.0, max(0.0, (d + depth) / (0.75 * depth)))
             distance[block, i, j, k] += w * d
             weight[block, i, j, k] += w
 
