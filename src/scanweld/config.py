@@ -25,32 +25,32 @@ class Section(BaseModel):
 class PrepareConfig(Section):
     """Scan -> range image, mesh and samples."""
 
-    image_pixels: int = Field(300, ge=64, le=2000)
+    image_pixels: int = Field(default=300, ge=64, le=2000)
     """Pixels across the diameter of the working range image, at most (never finer than the scan)."""
-    jump_pixels: float = Field(6.0, gt=1)
+    jump_pixels: float = Field(default=6.0, gt=1)
     """Depth step between neighbouring pixels, in footprints, above which the surface is cut."""
-    closing_diameters: float = Field(0.03, ge=0, le=0.2)
+    closing_diameters: float = Field(default=0.03, ge=0, le=0.2)
     """Radius by which the silhouette is closed before what lies outside it counts as free."""
-    rim_pixels: int = Field(2, ge=1)
+    rim_pixels: int = Field(default=2, ge=1)
     """Width of the rim along jumps, holes and the silhouette."""
-    min_cosine: float = Field(0.15, ge=0, lt=1)
+    min_cosine: float = Field(default=0.15, ge=0, lt=1)
     """Samples whose normal is farther from the viewing direction than this are left out."""
-    num_samples: int = Field(800, ge=100)
+    num_samples: int = Field(default=800, ge=100)
     """Oriented samples of a scan."""
 
 
 class HeatConfig(Section):
     """PA-HKS keypoints (paper 3.1)."""
 
-    max_front_vertices: int = Field(1500, ge=200)
+    max_front_vertices: int = Field(default=1500, ge=200)
     """The front surface is thinned to this many vertices before the eigenproblem."""
-    num_modes: int = Field(120, ge=20)
+    num_modes: int = Field(default=120, ge=20)
     """Eigenpairs of the Laplace-Beltrami operator."""
-    num_times: int = Field(10, ge=3)
+    num_times: int = Field(default=10, ge=3)
     """Diffusion times, log-spaced from 4 / lambda_k to the longest."""
-    longest_time_diameters2: float = Field(2e-2, gt=0)
+    longest_time_diameters2: float = Field(default=2e-2, gt=0)
     """Longest diffusion time, in squared diameters."""
-    group_diameters: float = Field(0.05, gt=0)
+    group_diameters: float = Field(default=0.05, gt=0)
     """Keypoints nearer than this, with like signatures, become one."""
 
 
@@ -59,55 +59,55 @@ class PairsConfig(Section):
 
     keypoints: Literal["mixed", "heat", "even"] = "mixed"
     """What anchors the hypotheses: PA-HKS keypoints, evenly spread points, or both."""
-    anchor_diameters: float = Field(0.07, gt=0)
+    anchor_diameters: float = Field(default=0.07, gt=0)
     """Spacing of evenly spread anchors."""
-    num_turns: int = Field(24, ge=8)
+    num_turns: int = Field(default=24, ge=8)
     """Turns about the normal that are tried for each pair of anchors."""
     tolerance_diameters: tuple[float, float, float] = (0.04, 0.02, 0.012)
     """Depth tolerance of the evidence, coarse to fine."""
     num_survivors: tuple[int, int] = (300, 30)
     """Hypotheses that go on to the first and to the second refinement."""
-    num_alternatives: int = Field(8, ge=1)
+    num_alternatives: int = Field(default=8, ge=1)
     """Distinct poses that are kept for a pair."""
-    min_score: float = Field(0.10, ge=0, le=1)
+    min_score: float = Field(default=0.10, ge=0, le=1)
     """Score below which a pair is not accepted on its own."""
-    min_margin: float = Field(0.2, ge=0, le=1)
+    min_margin: float = Field(default=0.2, ge=0, le=1)
     """Share of the score by which the best pose must beat its best distinct rival."""
-    min_observability: float = Field(5e-4, ge=0)
+    min_observability: float = Field(default=5e-4, ge=0)
     """Smallest over largest eigenvalue of the information matrix below which a pose slides."""
 
 
 class GraphConfig(Section):
     """Pairs -> poses of all scans that can be placed."""
 
-    max_cycle_deg: float = Field(5.0, gt=0)
+    max_cycle_deg: float = Field(default=5.0, gt=0)
     """Closing error above which a cycle of pairs contradicts itself."""
-    max_cycle_diameters: float = Field(0.03, gt=0)
+    max_cycle_diameters: float = Field(default=0.03, gt=0)
     """The same for the shift."""
-    min_edge_score: float = Field(-0.05, ge=-1, le=1)
+    min_edge_score: float = Field(default=-0.05, ge=-1, le=1)
     """Score below which a pair is not called accepted even where it agrees with the poses."""
-    min_mutual_score: float = Field(0.15, ge=0)
+    min_mutual_score: float = Field(default=0.15, ge=0)
     """Score of a merge that rests on several weak pairs that propose the same motion."""
-    max_mutual_violated_share: float = Field(0.1, ge=0)
+    max_mutual_violated_share: float = Field(default=0.1, ge=0)
     """Samples that the other sensors contradict in such a merge, as a share of those that agree."""
-    min_margin: float = Field(0.2, ge=0, le=1)
+    min_margin: float = Field(default=0.2, ge=0, le=1)
     """Share of its score by which a merge must beat the best distinct one."""
-    max_violated_share: float = Field(0.15, ge=0)
+    max_violated_share: float = Field(default=0.15, ge=0)
     """Samples that the other sensors contradict, as a share of those that agree."""
-    max_violation: float = Field(0.03, ge=0)
+    max_violation: float = Field(default=0.03, ge=0)
     """Share of samples by which violation may exceed half the agreement in any implied pair."""
 
 
 class ContoursConfig(Section):
     """MM-ICC (paper 3.2)."""
 
-    jump_pixels: float = Field(8.0, gt=1)
+    jump_pixels: float = Field(default=8.0, gt=1)
     """Thresholds tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
-    trim: float = Field(0.7, gt=0, le=1)
+    trim: float = Field(default=0.7, gt=0, le=1)
     """Share of the contour matches that trimmed ICP keeps."""
-    num_renders: int = Field(20, ge=1)
+    num_renders: int = Field(default=20, ge=1)
     """Outer iterations: predicted range images are rendered anew in each."""
-    num_steps: int = Field(3, ge=1)
+    num_steps: int = Field(default=3, ge=1)
     """Inner iterations between two renderings."""
     residual: Literal["point", "normal"] = "normal"
     """Distance of contours in 3D, as published, or that followed by their distance across the
@@ -117,29 +117,29 @@ class ContoursConfig(Section):
 class RefineConfig(Section):
     """Joint refinement of all poses with surface and contour terms."""
 
-    num_rounds: int = Field(8, ge=1)
+    num_rounds: int = Field(default=8, ge=1)
     """Rounds of matching and solving."""
     match_diameters: tuple[float, float] = (0.02, 0.006)
     """Farthest match, in the first and in the last round."""
-    contour_weight: float = Field(1.0, ge=0)
+    contour_weight: float = Field(default=1.0, ge=0)
     """Weight of the contour term beside the surface term; 0 leaves it out."""
 
 
 class FusionConfig(Section):
     """Posed scans -> one mesh."""
 
-    voxel_resolutions: float = Field(1.5, gt=0)
+    voxel_resolutions: float = Field(default=1.5, gt=0)
     """Edge of a voxel."""
-    max_voxels_across: int = Field(400, ge=50)
+    max_voxels_across: int = Field(default=400, ge=50)
     """Voxels across the object's diameter, at most."""
-    truncation_voxels: float = Field(4.0, ge=2)
+    truncation_voxels: float = Field(default=4.0, ge=2)
     """Distance at which the signed distance is cut off."""
 
 
 class Config(Section):
     """All settings of a run; ``Config()`` is what users get who give none."""
 
-    seed: int = Field(0, ge=0)
+    seed: int = Field(default=0, ge=0)
     """Seed of everything random; together with the scans' content it fixes the output's bytes."""
     unit: Unit | None = None
     """Unit of the scans' coordinates; unknown if not given. Nothing depends on it but reports."""
