@@ -110,9 +110,9 @@ def test_model_is_the_mesh(tmp_path: Path, result: Reconstruction):
 def test_order_of_the_records_does_not_change_the_bytes(tmp_path: Path, result: Reconstruction):
     backwards = dataclasses.replace(
         result,
-        poses=dict(reversed(result.poses.items())),
-        unplaced=dict(reversed(result.unplaced.items())),
-        scans=dict(reversed(result.scans.items())),
+        poses=dict(reversed(list(result.poses.items()))),
+        unplaced=dict(reversed(list(result.unplaced.items()))),
+        scans=dict(reversed(list(result.scans.items()))),
     )
     for folder, each in ((tmp_path / "a", result), (tmp_path / "b", backwards)):
         folder.mkdir()

@@ -71,7 +71,9 @@ def test_force_replaces_an_old_output(old_output: Path):
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_interruption_keeps_old_output_and_finished_work(old_output: Path, error: type):
+def test_interruption_keeps_old_output_and_finished_work(
+    old_output: Path, error: type[BaseException]
+):
     with pytest.raises(error), Workspace(old_output, force=True) as workspace:
         workspace.cache.put("ab", "finished")
         (workspace.staging / "poses.json").write_text("half")
@@ -93,7 +95,7 @@ def test_interruption_before_anything_is_finished_leaves_nothing(output: Path):
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
 def test_failure_between_the_two_moves_brings_the_old_output_back(
-    old_output: Path, monkeypatch: pytest.MonkeyPatch, error: type | OSError
+    old_output: Path, monkeypatch: pytest.MonkeyPatch, error: type[BaseException] | OSError
 ):
     move = Path.rename
 
