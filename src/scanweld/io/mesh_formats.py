@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.io.raw import RawScan, fan_triangles, to_bytes
-from scanweld.io.text import is_number, parse_numbers
+from scanweld.io.text import is_number
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
 _STL_HEAD = 84
@@ -94,8 +94,7 @@ def read_stl(path: Path, data: bytes) -> RawScan:
         facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEAD)
         corners = facets["corners"].reshape(-1, 3).astype(np.float64)
     elif data.lstrip()[:5].lower() == b"solid" and b"endsolid" in data:
-        words = re.findall(rb"\bvertex\s+(\S+\s+\S+\s+\S+)", data)
-        corners = parse_numbers(path, b" ".join(words)).reshape(-1, 3)
+        corners = _ascii_corners(path, data)
     else:
         raise ReadError(f"{path}: not an STL file, or a truncated one; copy it again")
     if len(corners) % 3:
@@ -104,6 +103,17 @@ def read_stl(path: Path, data: bytes) -> RawScan:
     faces = index.reshape(-1, 3)
     a, b, c = faces.T
     return RawScan(points=points, faces=faces[(a != b) & (b != c) & (c != a)])
+
+
+def _ascii_corners(path: Path, data: bytes) -> FloatArray:
+    """The corners (3 F, 3) in the order of an ASCII STL."""
+    corners: list[list[float]] = []
+    for number, words in _lines(data):
+        if words[0].lower() == b"vertex":
+            if len(words) != 4 or not all(map(is_number, words[1:])):
+                raise _broken(path, number, words)
+            corners.append([float(word) for word in words[1:]])
+    return np.array(corners, dtype=np.float64).reshape(-1, 3)
 
 
 def _lines(data: bytes) -> Iterator[tuple[int, list[bytes]]]:

@@ -58,22 +58,19 @@ def read_ply(path: Path, data: bytes) -> RawScan:
             f"range grid {grid.shape[1]} x {grid.shape[0]} cells; correct either"
         )
     confidence = _stack(vertex, ("confidence",))
+    intensity = _bytes(path, element, vertex, ("intensity",))
     return RawScan(
         points=points,
         grid=grid,
         faces=_faces(header, tables),
         normals=_stack(vertex, ("nx", "ny", "nz")),
-        colors=next(filter(_is_there, (_bytes(path, element, vertex, c) for c in _COLORS)), None),
-        intensity=_column_bytes(path, element, vertex, "intensity"),
+        colors=_colors(path, element, vertex),
+        intensity=None if intensity is None else intensity[:, 0],
         confidence=None if confidence is None else confidence[:, 0],
         camera=camera,
         scan_from_sensor=_sensor_pose(header),
         notes=notes,
     )
-
-
-def _is_there(colors: ByteArray | None) -> bool:
-    return colors is not None
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
@@ -98,9 +95,13 @@ def _bytes(
     return found
 
 
-def _column_bytes(path: Path, element: PlyElement, columns: Columns, name: str) -> ByteArray | None:
-    found = _bytes(path, element, columns, (name,))
-    return None if found is None else found[:, 0]
+def _colors(path: Path, element: PlyElement, columns: Columns) -> ByteArray | None:
+    """Red, green and blue (N, 3), under the first of their usual names that is there."""
+    for names in _COLORS:
+        found = _bytes(path, element, columns, names)
+        if found is not None:
+            return found
+    return None
 
 
 def _index_list(path: Path, columns: Columns) -> tuple[IntArray, IntArray] | None:

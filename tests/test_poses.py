@@ -1,0 +1,169 @@
+"""Files of poses: both formats read, one written, the same bytes each time."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from scanweld.errors import ReadError
+from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.io import PoseSet, read_poses, write_poses
+from tests.data import require_data
+
+IDENTITY = np.eye(4).tolist()
+
+
+def random_pose(rng: np.random.Generator) -> Pose:
+    return Pose(rotation=random_rotation(rng), translation=rng.normal(size=3) * 100)
+
+
+def assert_same(a: PoseSet, b: PoseSet) -> None:
+    assert a.components == b.components
+    assert a.unplaced == b.unplaced
+    assert set(a.poses) == set(b.poses)
+    for name, pose in a.poses.items():
+        np.testing.assert_array_equal(pose.matrix(), b.poses[name].matrix())
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    names=st.lists(st.text(st.characters(codec="utf-8"), max_size=8), unique=True, max_size=8),
+    cuts=st.tuples(st.integers(0, 8), st.integers(0, 8)),
+    seed=st.integers(0, 2**32),
+)
+def test_written_poses_are_read_back_exactly(
+    names: list[str], cuts: tuple[int, int], seed: int, tmp_path: Path
+) -> None:
+    first, second = sorted(cuts)
+    parts = (tuple(names[:first]), tuple(names[first:second]))
+    rng = np.random.default_rng(seed)
+    poses = PoseSet(
+        poses={name: random_pose(rng) for part in parts for name in part},
+        components=tuple(part for part in parts if part),
+        unplaced={name: f"why ä \n {name}" for name in names[second:]},
+    )
+    path = tmp_path / "poses.json"
+    write_poses(path, poses)
+    written = path.read_bytes()
+    again = read_poses(path)
+    assert_same(poses, again)
+    write_poses(path, again)
+    assert path.read_bytes() == written
+
+
+def test_what_is_written_has_the_promised_form(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    names = ("scan10", "scan2", "büste")
+    poses = PoseSet(
+        poses={name: random_pose(rng) for name in names},
+        components=(("scan2", "scan10"), ("büste",)),
+        unplaced={"b": "too small", "a": "empty"},
+    )
+    write_poses(tmp_path / "poses.json", poses)
+    text = (tmp_path / "poses.json").read_text(encoding="utf-8")
+    content = json.loads(text)
+    assert list(content) == ["format", "convention", "scans", "components", "unplaced"]
+    assert content["format"] == 1
+    assert list(content["scans"]) == ["büste", "scan2", "scan10"]
+    assert content["components"] == [["scan2", "scan10"], ["büste"]]
+    assert list(content["unplaced"].items()) == [("a", "empty"), ("b", "too small")]
+    assert "büste" in text
+    row = json.dumps(content["scans"]["scan2"][0])
+    assert any(line.strip().rstrip(",") == row for line in text.splitlines())
+
+
+def test_the_order_of_scans_does_not_change_the_bytes(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    poses = {name: random_pose(rng) for name in ("c", "a", "b")}
+    for k, order in enumerate(("abc", "cab")):
+        same = PoseSet(poses={name: poses[name] for name in order}, components=(tuple("abc"),))
+        write_poses(tmp_path / f"{k}.json", same)
+    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
+
+
+def test_the_flat_format_is_one_component(tmp_path: Path) -> None:
+    path = tmp_path / "flat.json"
+    path.write_text("\ufeff" + json.dumps({"b": IDENTITY, "a": IDENTITY}), encoding="utf-8")
+    poses = read_poses(path)
+    assert poses.components == (("b", "a"),)
+    assert poses.unplaced == {}
+
+
+def test_own_format_without_components_is_one_component(tmp_path: Path) -> None:
+    path = tmp_path / "poses.json"
+    path.write_text(json.dumps({"format": 1, "scans": {"a": IDENTITY}}))
+    assert read_poses(path).components == (("a",),)
+
+
+def scaled() -> list[list[float]]:
+    return (np.eye(4) * [2, 2, 2, 1]).tolist()
+
+
+def mirrored() -> list[list[float]]:
+    return (np.eye(4) * [1, 1, -1, 1]).tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "not valid JSON"),
+        ("{", "not valid JSON"),
+        ("[1]", "not a JSON object"),
+        ('{"a": 3}', "'a' is not a 4x4 matrix"),
+        ('{"a": [[1, 0], [0, 1]]}', "'a' is not a 4x4 matrix"),
+        (json.dumps({"a": [["1", 0, 0, 0], *IDENTITY[1:]]}), "'a' is not a 4x4 matrix"),
+        (json.dumps({"a": [[True, 0, 0, 0], *IDENTITY[1:]]}), "'a' is not a 4x4 matrix"),
+        (json.dumps({"a": [[1, 0, 0, float("nan")], *IDENTITY[1:]]}), "NaN is no number"),
+        (json.dumps({"a": IDENTITY}).replace("[1.0, 0.0, 0.0, 0.0]", "[1, 0, 0, 1e999]"), "'a': "),
+        (json.dumps({"a": scaled()}), "'a': the 4x4 matrix is not a rigid motion"),
+        (json.dumps({"a": mirrored()}), "'a': "),
+        (json.dumps({"a": np.ones((4, 4)).tolist()}), "'a': .*last row"),
+        ('{"a": 1, "a": 2}', "'a' comes twice"),
+        ('{"format": 2, "scans": {}}', "format 2 is unknown"),
+        ('{"format": 1}', "must be JSON objects"),
+        ('{"format": 1, "scans": {}, "components": [["a"]]}', "every placed scan"),
+        ('{"format": 1, "scans": {}, "components": ["a"]}', "list of lists of names"),
+        (
+            json.dumps({"format": 1, "scans": {"a": IDENTITY}, "unplaced": {"a": "?"}}),
+            "'a' has a pose and is named as unplaced",
+        ),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "poses.json"
+    path.write_text(text)
+    with pytest.raises(ReadError, match=says) as caught:
+        read_poses(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ReadError, match=re.escape(str(tmp_path / "poses.json"))):
+        read_poses(tmp_path / "poses.json")
+
+
+@pytest.mark.parametrize(
+    "components", [(), (("a",),), (("a", "b"), ("b",)), (("a", "a", "b"),), (("a", "b", "c"),)]
+)
+def test_components_name_every_placed_scan_once(components: tuple[tuple[str, ...], ...]) -> None:
+    poses = {"a": Pose.identity(), "b": Pose.identity()}
+    with pytest.raises(ValueError, match="every placed scan"):
+        PoseSet(poses=poses, components=components)
+
+
+@pytest.mark.parametrize("folder", ["stanford-bunny", "stanford-dragon"])
+@pytest.mark.parametrize("name", ["poses.json", "poses_conf.json"])
+def test_reference_poses_keep_their_digits(folder: str, name: str) -> None:
+    path = require_data(f"{folder}/{name}")
+    content = json.loads(path.read_text())
+    poses = read_poses(path).poses
+    assert poses.keys() == content.keys()
+    for key, rows in content.items():
+        np.testing.assert_allclose(poses[key].matrix(), rows, atol=1e-9)
