@@ -26,7 +26,7 @@ class PrepareConfig(Section):
     """Scan -> range image, mesh and samples."""
 
     image_pixels: int = Field(default=300, ge=64, le=2000)
-    """Pixels across the diameter of the working range image, at most (never finer than the scan)."""
+    """Pixels of the working range image across the diameter, at most; never finer than the scan."""
     jump_pixels: float = Field(default=6.0, gt=1)
     """Depth step between neighbouring pixels, in footprints, above which the surface is cut."""
     closing_diameters: float = Field(default=0.03, ge=0, le=0.2)
@@ -156,7 +156,7 @@ class Config(Section):
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
 
 
-def load_config(path: Path | None, **overrides: Any) -> Config:  # noqa: ANN401
+def load_config(path: Path | None, **overrides: Any) -> Config:
     """Settings from defaults, then a TOML file, then top-level overrides that are not None.
 
     Raises:

@@ -70,7 +70,8 @@ class Camera:
         if self.model is CameraModel.PINHOLE:
             return np.stack([a * depth, b * depth, depth], axis=-1)
         return np.stack(
-            [depth * np.cos(b) * np.sin(a), depth * np.sin(b), depth * np.cos(b) * np.cos(a)], axis=-1
+            [depth * np.cos(b) * np.sin(a), depth * np.sin(b), depth * np.cos(b) * np.cos(a)],
+            axis=-1,
         )
 
     def unproject_image(self, depth: FloatArray) -> FloatArray:

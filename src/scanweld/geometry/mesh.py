@@ -1,4 +1,4 @@
-"""Triangle meshes: fused models, virtual objects, and the surface between a range image's pixels."""
+"""Triangle meshes: fused models, virtual objects, and the surface between an image's pixels."""
 
 from dataclasses import dataclass
 

@@ -40,13 +40,15 @@ class Pose:
         m = np.asarray(matrix, dtype=np.float64)
         if m.shape != (4, 4) or not np.allclose(m[3], [0, 0, 0, 1]):
             raise ValueError("a rigid motion is a 4x4 matrix with last row 0 0 0 1")
-        if not np.isfinite(m).all() or not np.allclose(m[:3, :3] @ m[:3, :3].T, np.eye(3), atol=1e-3):
+        if not np.isfinite(m).all() or not np.allclose(
+            m[:3, :3] @ m[:3, :3].T, np.eye(3), atol=1e-3
+        ):
             raise ValueError("the 4x4 matrix is not a rigid motion")
         return Pose(rotation=nearest_rotation(m[:3, :3]), translation=m[:3, 3])
 
     @staticmethod
     def exp(twist: ArrayLike) -> "Pose":
-        """The motion of a twist (6,): rotation vector in radians, then the translation's generator."""
+        """The motion of a twist (6,): rotation vector in radians, then the shift's generator."""
         xi = np.asarray(twist, dtype=np.float64)
         w, v = xi[:3], xi[3:]
         return Pose(rotation=rotation_exp(w), translation=_left_jacobian(w) @ v)

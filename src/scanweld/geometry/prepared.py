@@ -72,9 +72,7 @@ class Samples:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, np.float64, (None, 3)))
-        object.__setattr__(
-            self, "normals", frozen(self.normals, np.float64, (len(self.points), 3))
-        )
+        object.__setattr__(self, "normals", frozen(self.normals, np.float64, (len(self.points), 3)))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

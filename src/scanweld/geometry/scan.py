@@ -77,7 +77,11 @@ class RangeScan:
             raise ValueError("a scan's viewpoint is unknown exactly where it has no sensor pose")
 
     def with_sensor(
-        self, scan_from_sensor: Pose, viewpoint: Viewpoint, *notes: str, camera: Camera | None = None
+        self,
+        scan_from_sensor: Pose,
+        viewpoint: Viewpoint,
+        *notes: str,
+        camera: Camera | None = None,
     ) -> "RangeScan":
         """The same scan with the sensor found; notes are added to the scan's own."""
         return replace(

@@ -197,7 +197,9 @@ def _graph(problem: _Problem, assembly: _Assembly) -> ViewGraph:
         if edge not in accepted
     }
     unplaced = {
-        k: _why_unplaced(problem, k, components) for k in range(problem.num_scans) if k not in placed
+        k: _why_unplaced(problem, k, components)
+        for k in range(problem.num_scans)
+        if k not in placed
     }
     doubts = {}
     for component in components:
@@ -281,4 +283,3 @@ def _doubts(
         for k in edge:
             doubts.setdefault(k, "a good pair disagrees with its pose")
     return doubts
-

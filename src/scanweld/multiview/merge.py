@@ -7,7 +7,13 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT, Evidence, PairKind, PairResult
+from scanweld.pairs.result import (
+    CONTRADICT_WEIGHT,
+    VIOLATION_WEIGHT,
+    Evidence,
+    PairKind,
+    PairResult,
+)
 
 Judge = Callable[[int, int, Pose], Evidence]
 """Mean evidence of both directions on scans i and j at a pose ``i_from_j`` of their sensors."""
@@ -154,9 +160,7 @@ def is_near(p: Pose, q: Pose, middle: FloatArray, near: tuple[float, float]) -> 
 def _judged(
     a: Poses, b: Poses, a_from_b: Pose, supports: tuple[Support, ...], judge: Judge
 ) -> Merge:
-    evidence = [
-        judge(i, j, a[i].inverse() @ a_from_b @ b[j]) for i in sorted(a) for j in sorted(b)
-    ]
+    evidence = [judge(i, j, a[i].inverse() @ a_from_b @ b[j]) for i in sorted(a) for j in sorted(b)]
     violated = [e.front + CONTRADICT_WEIGHT / VIOLATION_WEIGHT * e.contradict for e in evidence]
     return Merge(
         a_from_b=a_from_b,

@@ -1,7 +1,7 @@
 """The view graph: which pairs hold, which scans they place, and why the rest stay out."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import Alternative, PairResult
@@ -33,6 +33,7 @@ class ViewGraph:
         components: Of at least two scans, largest first.
         unplaced: Why the other scans are in none.
         doubts: What speaks against a placed scan, in words.
+        rms: Point-to-plane residual of each placed scan after the joint refinement.
     """
 
     pairs: Mapping[Edge, PairResult]
@@ -41,6 +42,7 @@ class ViewGraph:
     components: tuple[Component, ...]
     unplaced: Mapping[int, str]
     doubts: Mapping[int, str]
+    rms: Mapping[int, float] = field(default_factory=dict)
 
     def neighbours(self, scan: int) -> tuple[int, ...]:
         """Scans that share an accepted pair with one, in order."""

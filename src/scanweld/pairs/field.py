@@ -83,9 +83,7 @@ def _closest_points(
 
     index = np.full(shape, -1, dtype=np.int32)
     index.ravel()[flat[chosen]] = np.arange(len(chosen), dtype=np.int32)
-    nearest = ndimage.distance_transform_edt(
-        index < 0, return_distances=False, return_indices=True
-    )
+    nearest = ndimage.distance_transform_edt(index < 0, return_distances=False, return_indices=True)
     assert isinstance(nearest, np.ndarray)
     closest = index[tuple(nearest)]
     return np.ascontiguousarray(surface), np.ascontiguousarray(closest), np.append(origin, edge)

@@ -102,9 +102,7 @@ def _hang(frame_i: FloatArray, frame_j: FloatArray, turn: FloatArray, pose: Floa
         x, y, n = frame_i[3 * r], frame_i[3 * r + 1], frame_i[3 * r + 2]
         x, y = c * x + s * y, c * y - s * x
         for k in range(3):
-            pose[3 * r + k] = (
-                x * frame_j[3 * k] + y * frame_j[3 * k + 1] + n * frame_j[3 * k + 2]
-            )
+            pose[3 * r + k] = x * frame_j[3 * k] + y * frame_j[3 * k + 1] + n * frame_j[3 * k + 2]
     for r in range(3):
         pose[9 + r] = frame_i[9 + r] - (
             pose[3 * r] * frame_j[9] + pose[3 * r + 1] * frame_j[10] + pose[3 * r + 2] * frame_j[11]
@@ -139,9 +137,7 @@ def _score_all(
                     if s == NUM_FIRST_LOOK and total < 2 * NUM_FIRST_LOOK * FIRST_LOOK_FLOOR:
                         break
                     total += weights[
-                        ask_backward(
-                            camera_j, raster_j, points_i[s], normals_i[s], pose, tolerance
-                        )
+                        ask_backward(camera_j, raster_j, points_i[s], normals_i[s], pose, tolerance)
                     ]
                     total += weights[
                         ask_forward(camera_i, raster_i, points_j[s], normals_j[s], pose, tolerance)

@@ -10,8 +10,8 @@ from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import WEIGHTS, Anchors, sweep
 from scanweld.pairs.icp import IcpSchedule, information_of, refine_poses
 from scanweld.pairs.result import Alternative, PairResult
-from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence
 from scanweld.pairs.verdict import judge_pair
+from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence
 
 SAME_ANGLE_DEG = 8.0
 SAME_SHIFT_DIAMETERS = 0.04
@@ -48,9 +48,7 @@ def register_pair(
         The result, with pose i_from_j between the sensor frames.
     """
     coarse, middle, fine = (t * diameter for t in config.tolerance_diameters)
-    swept = [
-        sweep(field_i, field_j, a, b, config.num_turns, coarse, MAX_SWEPT) for a, b in anchors
-    ]
+    swept = [sweep(field_i, field_j, a, b, config.num_turns, coarse, MAX_SWEPT) for a, b in anchors]
     poses = np.concatenate([p for p, _ in swept])
     scores = np.concatenate([s for _, s in swept])
     order = np.argsort(-scores, kind="stable")

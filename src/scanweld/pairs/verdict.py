@@ -20,7 +20,9 @@ def judge_pair(
 ) -> PairResult:
     """Give a pair its kind: what its evidence, margin and observability allow to say."""
     eigenvalues = np.linalg.eigvalsh(information)
-    observability = float(max(eigenvalues[0], 0.0) / eigenvalues[-1]) if eigenvalues[-1] > 0 else 0.0
+    observability = (
+        float(max(eigenvalues[0], 0.0) / eigenvalues[-1]) if eigenvalues[-1] > 0 else 0.0
+    )
     margin = margin_of(alternatives)
     kind, reason = _kind(alternatives, observability, margin, config)
     return PairResult(
@@ -58,7 +60,10 @@ def _kind(
             return PairKind.CONTRADICTED, f"each sensor saw through the other's surface: {told}"
         return PairKind.NO_OVERLAP, f"too little overlap to be sure: {told}"
     if observability < config.min_observability:
-        return PairKind.SLIDING, f"the surfaces slide on each other: observability {observability:.1e}"
+        return (
+            PairKind.SLIDING,
+            f"the surfaces slide on each other: observability {observability:.1e}",
+        )
     if margin < config.min_margin:
         return PairKind.AMBIGUOUS, f"another pose explains the scans as well: margin {margin:.2f}"
     return PairKind.GOOD, ""

@@ -45,7 +45,7 @@ def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
 
 
 def take_samples(image: RangeImage, config: PrepareConfig) -> Samples:
-    """Oriented points of an image, evenly spread by area, off the rims, not at grazing incidence."""
+    """Oriented points of an image, even by area, off the rims and not at grazing incidence."""
     points = image.points()
     toward = -np.einsum("hwk,hwk->hw", image.camera.view_directions(points), image.normals)
     with np.errstate(invalid="ignore"):

@@ -102,7 +102,7 @@ def _scan_faces(
 
 
 def _splat(points: FloatArray, camera: Camera, max_step: float) -> FloatArray:
-    """Nearest depth of the points in each pixel; single empty pixels within a surface are filled."""
+    """Nearest depth of the points in each pixel; small gaps within a surface are filled."""
     pixels, z = camera.project(points)
     u, v = np.rint(pixels).astype(np.int64).T
     depth = np.full((camera.height, camera.width), np.inf)
@@ -211,6 +211,3 @@ def _in_view(scan: RangeScan, camera: Camera) -> BoolArray:
     u, v = pixels[..., 0], pixels[..., 1]
     inside_u = (u >= -0.5) & (u <= scan.camera.width - 0.5)
     return inside_u & (v >= -0.5) & (v <= scan.camera.height - 0.5)
-
-
-

@@ -82,24 +82,29 @@ def _check_usable(scan: RangeScan) -> None:
             f"{scan.name}: a scan of {n} points is too small to register; "
             f"give at least {MIN_POINTS}"
         )
-    extents = np.linalg.eigvalsh(np.cov(scan.points.T))
-    if extents[1] <= MIN_WIDTH**2 * extents[2]:
+    if _are_on_line(scan.points):
         raise InputError(f"{scan.name}: all points lie on one line; a scan needs a surface")
+
+
+def _are_on_line(points: FloatArray) -> bool:
+    extents = np.linalg.eigvalsh(np.cov(points.T))
+    return bool(extents[1] <= MIN_WIDTH**2 * extents[2])
 
 
 def _in_own_frame(scan: RangeScan) -> RangeScan | None:
     """The scan with the sensor at the origin, if its camera has no pose but sees it from there."""
     if scan.camera is None:
         return None
-    pixels, depth = scan.camera.project(scan.points)
+    size = (scan.camera.width, scan.camera.height)
     if scan.grid is None:
-        inside = (pixels > -1) & (pixels < (scan.camera.width, scan.camera.height))
-        is_seen = bool((inside.all(axis=1) & (depth > 0)).all())
+        pixels, depth = scan.camera.project(scan.points)
+        is_seen = ((pixels > -1) & (pixels < size)).all(axis=1) & (depth > 0)
     else:
         points, cells = _cells(scan.points, scan.grid)
         pixels, _ = scan.camera.project(points)
-        is_seen = bool(np.median(np.abs(pixels - cells)) < MAX_RMS_PIXELS)
-    if not is_seen:
+        is_seen = (np.abs(pixels - cells) < MAX_RMS_PIXELS).all(axis=1)
+        is_seen &= size == scan.grid.shape[::-1]
+    if not is_seen.all():
         return None
     note = "the camera has no pose; the points fit it as they are, so they are in its frame"
     return scan.with_sensor(Pose.identity(), Viewpoint.ESTIMATED, note)
@@ -118,28 +123,38 @@ def _from_grid(scan: RangeScan) -> RangeScan | None:
     if scan.grid is None or np.count_nonzero(scan.grid >= 0) < MIN_POINTS:
         return None
     points, pixels = _cells(scan.points, scan.grid)
-    height, width = scan.grid.shape
-    if pixels.std(axis=0).min() < 1:
+    if pixels.std(axis=0).min() < 1 or _are_on_line(points):
         return None
     sight = line_of_sight(points, pixels)
     if sight.misfit > MAX_MISFIT:
         return None
-    orthographic = fit_orthographic(points, pixels, (height, width), sight.axis)
-    if orthographic is None or orthographic.rms > SAME_RMS_PIXELS:
-        pinhole = fit_pinhole(points, pixels, (height, width))
-        if pinhole and not (orthographic and orthographic.rms < SAME_RMS_RATIO * pinhole.rms):
-            return _with_camera(scan, pinhole)
     axis, notes = sight.axis, ()
     if not sight.has_side:
         depth = np.where(scan.grid >= 0, (scan.points @ axis)[scan.grid], np.nan)
         axis, notes = _sided(scan, axis, depth, sight.pitch)
-    if orthographic:
-        turned = fit_orthographic(points, pixels, (height, width), axis)
-        return _with_camera(scan, turned or orthographic, *notes)
+    height, width = scan.grid.shape
+    fit = _simplest_camera(points, pixels, (height, width), axis)
+    if fit and fit.camera.model is CameraModel.PINHOLE:
+        return _with_camera(scan, fit)
+    if fit:
+        return _with_camera(scan, fit, *notes)
     if sight.is_oblique:
         notes = (OBLIQUE_NOTE, *notes)
     note = "no frame camera explains the grid; its line of sight was fitted"
     return _with_direction(scan, axis, sight.right, Viewpoint.FITTED, note, *notes)
+
+
+def _simplest_camera(
+    points: FloatArray, pixels: FloatArray, shape: tuple[int, int], viewing: FloatArray
+) -> CameraFit | None:
+    """An orthographic camera unless a pinhole is clearly better; None if neither will do."""
+    orthographic = fit_orthographic(points, pixels, shape, viewing)
+    if orthographic and orthographic.rms < SAME_RMS_PIXELS:
+        return orthographic
+    pinhole = fit_pinhole(points, pixels, shape)
+    if orthographic and not (pinhole and SAME_RMS_RATIO * pinhole.rms < orthographic.rms):
+        return orthographic
+    return pinhole
 
 
 def _from_surface(scan: RangeScan) -> RangeScan:

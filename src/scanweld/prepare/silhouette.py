@@ -16,7 +16,7 @@ def classify_pixels(
     shadows as well as air. Where the silhouette leaves the field of view, nothing is free.
 
     Args:
-        is_surface: (H, W) pixels with a depth, with an empty border at least as wide as the closing.
+        is_surface: (H, W) pixels with a depth; the border, as wide as the closing, is empty.
         in_view: (H, W) pixels that the sensor could see at all.
         closing_pixels: Radius of the closing.
 

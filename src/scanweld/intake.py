@@ -1,0 +1,123 @@
+"""What comes in: scans prepared, sorted by content, and those that cannot take part named."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanweld.config import Config
+from scanweld.errors import InputError
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.prepare import prepare
+from scanweld.stages import Stages
+
+logger = logging.getLogger(__name__)
+
+MAX_SIZE_RATIO = 6.0
+"""A scan this many times larger or smaller than the others is in another unit, or not of it."""
+UNIT_RATIOS = {
+    1000.0: "m and mm",
+    100.0: "m and cm",
+    10.0: "cm and mm",
+    25.4: "in and mm",
+    39.37: "m and in",
+    2.54: "in and cm",
+}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Intake:
+    """The scans of a run.
+
+    Attributes:
+        prepared: Those that take part, ordered by their content.
+        diameter: Median diameter of these.
+        refused: Reason for each of the others, by name.
+        scans: All that could be read, by name.
+    """
+
+    prepared: tuple[PreparedScan, ...]
+    diameter: float
+    refused: Mapping[str, str]
+    scans: Mapping[str, RangeScan]
+
+
+def take_in(
+    scans: Sequence[RangeScan], unreadable: Mapping[str, str], config: Config, stages: Stages
+) -> Intake:
+    """Prepare all scans; leave out duplicates, scans of another size and what shows no surface.
+
+    Raises:
+        InputError: If fewer than two scans are left, or two have the same name.
+    """
+    names = [scan.name for scan in scans]
+    if len(set(names)) < len(names):
+        raise InputError("two scans have the same name; names must be unique")
+    refused = dict(unreadable)
+    with stages.stage("prepare") as counts:
+        kept = _without_duplicates(scans, refused)
+        kept = _of_one_size(kept, refused)
+        outcomes = stages.each("prepare", lambda scan: _try_prepare(scan, config), kept)
+        prepared = []
+        for scan, outcome in zip(kept, outcomes, strict=True):
+            if isinstance(outcome, str):
+                refused[scan.name] = outcome
+            else:
+                prepared.append(outcome)
+        counts["scans"] = len(prepared)
+        counts["refused"] = len(refused)
+    if len(prepared) < 2:
+        told = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
+        raise InputError(
+            f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}, at least 2 are needed"
+            + (f" ({told})" if told else "")
+        )
+    prepared.sort(key=lambda scan: (scan.content_hash, scan.name))
+    return Intake(
+        prepared=tuple(prepared),
+        diameter=float(np.median([scan.diameter for scan in prepared])),
+        refused=refused,
+        scans={scan.name: scan for scan in scans},
+    )
+
+
+def _without_duplicates(scans: Sequence[RangeScan], refused: dict[str, str]) -> list[RangeScan]:
+    first: dict[str, str] = {}
+    kept = []
+    for scan in sorted(scans, key=lambda scan: scan.name):
+        original = first.setdefault(scan.content_hash(), scan.name)
+        if original == scan.name:
+            kept.append(scan)
+        else:
+            refused[scan.name] = f"same content as {original}, which is kept"
+    return kept
+
+
+def _of_one_size(scans: Sequence[RangeScan], refused: dict[str, str]) -> list[RangeScan]:
+    sizes = [principal_diameter(scan.points) if len(scan.points) > 3 else 0.0 for scan in scans]
+    usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
+    kept = []
+    for scan, size in zip(scans, sizes, strict=True):
+        ratio = max(size / usual, usual / size) if size > 0 and usual > 0 else 1.0
+        if ratio <= MAX_SIZE_RATIO:
+            kept.append(scan)
+            continue
+        larger = "larger" if size > usual else "smaller"
+        refused[scan.name] = f"{ratio:.3g} times {larger} than the other scans{_unit_hint(ratio)}"
+    return kept
+
+
+def _unit_hint(ratio: float) -> str:
+    closest = min(UNIT_RATIOS, key=lambda known: abs(np.log(ratio / known)))
+    if abs(np.log(ratio / closest)) > np.log(2.0):
+        return "; is it of the same object?"
+    return f"; units mixed up ({UNIT_RATIOS[closest]})? Give all scans in one unit"
+
+
+def _try_prepare(scan: RangeScan, config: Config) -> PreparedScan | str:
+    try:
+        return prepare(scan, config.prepare)
+    except InputError as error:
+        return str(error)

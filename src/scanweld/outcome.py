@@ -1,0 +1,231 @@
+"""The end of a run: what became of every scan and pair, and the verdict."""
+
+from collections.abc import Mapping, Sequence
+
+from scanweld.config import Config
+from scanweld.geometry.camera import Camera
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.scan import RangeScan
+from scanweld.heat.features import Features
+from scanweld.intake import Intake
+from scanweld.multiview.view_graph import ViewGraph
+from scanweld.pairs.field import ScanField
+from scanweld.pairs.result import Alternative, Evidence, PairResult
+from scanweld.pairs.visibility import judge
+from scanweld.reconstruction import (
+    AlternativeReport,
+    PairReport,
+    Reconstruction,
+    ScanReport,
+    ScanVerdict,
+    StageReport,
+    Verdict,
+)
+
+
+def conclude(
+    intake: Intake,
+    features: Sequence[Features | None],
+    fields: Sequence[ScanField],
+    graph: ViewGraph,
+    mesh: TriangleMesh | None,
+    config: Config,
+    stages: Mapping[str, StageReport],
+) -> Reconstruction:
+    """Put together what a run gives back, with poses between the scans' own frames."""
+    prepared = intake.prepared
+    unplaced = dict(intake.refused)
+    unplaced.update({prepared[k].name: reason for k, reason in graph.unplaced.items()})
+    scans = {
+        name: _unplaced_report(intake.scans.get(name), reason) for name, reason in unplaced.items()
+    }
+    for k, scan in enumerate(prepared):
+        found = features[k]
+        scans[scan.name] = _scan_report(
+            k, intake, fields, graph, 0 if found is None else len(found.points), config
+        )
+    verdict, reasons = _verdict(graph, scans)
+    return Reconstruction(
+        poses=_poses(prepared, graph),
+        components=tuple(
+            tuple(prepared[k].name for k in [c.reference, *_others(c.poses, c.reference)])
+            for c in graph.components
+        ),
+        unplaced=dict(sorted(unplaced.items())),
+        scans=dict(sorted(scans.items())),
+        pairs=tuple(
+            sorted(
+                (_pair_report(prepared, graph, edge) for edge in graph.pairs),
+                key=lambda pair: (pair.i, pair.j),
+            )
+        ),
+        mesh=mesh,
+        verdict=verdict,
+        reasons=reasons,
+        stages=stages,
+        config=config,
+    )
+
+
+def _others(poses: Mapping[int, Pose], reference: int) -> list[int]:
+    return [k for k in sorted(poses) if k != reference]
+
+
+def _poses(prepared: Sequence[PreparedScan], graph: ViewGraph) -> dict[str, Pose]:
+    """world_from_scan: the world of a component is its reference's scan frame."""
+    poses = {}
+    for component in graph.components:
+        world_from_reference = _scan_from_sensor(prepared[component.reference])
+        for k, pose in sorted(component.poses.items()):
+            sensor_from_scan = _scan_from_sensor(prepared[k]).inverse()
+            is_reference = k == component.reference
+            poses[prepared[k].name] = (
+                Pose.identity() if is_reference else world_from_reference @ pose @ sensor_from_scan
+            )
+    return dict(sorted(poses.items()))
+
+
+def _scan_from_sensor(scan: PreparedScan) -> Pose:
+    pose = scan.scan.scan_from_sensor
+    assert pose is not None, "a prepared scan has a located sensor"
+    return pose
+
+
+def _unplaced_report(scan: RangeScan | None, reason: str) -> ScanReport:
+    if scan is None:
+        return ScanReport(verdict=ScanVerdict.UNPLACED, reason=reason)
+    return ScanReport(
+        verdict=ScanVerdict.UNPLACED,
+        reason=reason,
+        num_points=len(scan.points),
+        num_dropped=scan.num_dropped,
+        camera=_camera_words(scan.camera),
+        viewpoint=scan.viewpoint,
+        notes=scan.notes,
+        content_hash=scan.content_hash(),
+    )
+
+
+def _scan_report(
+    k: int,
+    intake: Intake,
+    fields: Sequence[ScanField],
+    graph: ViewGraph,
+    num_keypoints: int,
+    config: Config,
+) -> ScanReport:
+    prepared = intake.prepared
+    scan = prepared[k]
+    neighbours = graph.neighbours(k)
+    overlap = None
+    if k in graph.unplaced:
+        verdict, reason = ScanVerdict.UNPLACED, graph.unplaced[k]
+    else:
+        overlap = _overlap(k, intake, fields, graph, config)
+        told = f"{overlap:.0%} of its surface agrees with another scan"
+        if k in graph.doubts:
+            verdict, reason = ScanVerdict.DOUBTFUL, graph.doubts[k]
+        else:
+            verdict = ScanVerdict.GOOD
+            pairs = "one pair" if len(neighbours) == 1 else f"{len(neighbours)} pairs"
+            reason = f"held by {pairs}; {told}"
+    return ScanReport(
+        verdict=verdict,
+        reason=reason,
+        num_points=len(scan.scan.points),
+        num_dropped=scan.scan.num_dropped,
+        resolution=scan.resolution,
+        diameter=scan.diameter,
+        camera=_camera_words(scan.scan.camera),
+        viewpoint=scan.scan.viewpoint,
+        notes=scan.scan.notes,
+        content_hash=scan.content_hash,
+        num_keypoints=num_keypoints,
+        edges=tuple(sorted(prepared[n].name for n in neighbours)),
+        overlap=overlap,
+        rms=graph.rms.get(k),
+    )
+
+
+def _overlap(
+    k: int, intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config
+) -> float:
+    """Largest share of a scan's samples that agree with one other scan of its component."""
+    poses = next(c.poses for c in graph.components if k in c.poses)
+    tolerance = config.pairs.tolerance_diameters[2] * intake.diameter
+    shares = [
+        judge(fields[k], fields[m], poses[k].inverse() @ poses[m], tolerance)[0].agree
+        for m in _others(poses, k)
+    ]
+    return max(shares, default=0.0)
+
+
+def _camera_words(camera: Camera | None) -> str | None:
+    if camera is None:
+        return None
+    return f"{camera.model.name.lower()} {camera.width} x {camera.height}"
+
+
+def _pair_report(
+    prepared: Sequence[PreparedScan], graph: ViewGraph, edge: tuple[int, int]
+) -> PairReport:
+    result = graph.pairs[edge]
+    chosen = graph.accepted.get(edge) or result.best
+    a, b = (prepared[k] for k in edge)
+    is_swapped = b.name < a.name
+    first, second = (b, a) if is_swapped else (a, b)
+
+    def between_scans(i_from_j: Pose) -> Pose:
+        pose = i_from_j.inverse() if is_swapped else i_from_j
+        return _scan_from_sensor(first) @ pose @ _scan_from_sensor(second).inverse()
+
+    return PairReport(
+        i=first.name,
+        j=second.name,
+        kind=result.kind,
+        accepted=edge in graph.accepted,
+        reason=graph.rejected.get(edge, _remark(result, chosen)),
+        i_from_j=None if chosen is None else between_scans(chosen.i_from_j),
+        score=None if chosen is None else chosen.score,
+        overlap=0.0 if chosen is None else _overlap_share(chosen.evidence),
+        evidence=None if chosen is None else chosen.evidence,
+        margin=result.margin,
+        observability=result.observability,
+        alternatives=tuple(
+            AlternativeReport(i_from_j=between_scans(option.i_from_j), score=option.score)
+            for option in result.alternatives
+        ),
+    )
+
+
+def _remark(result: PairResult, chosen: Alternative | None) -> str:
+    if chosen is not None and chosen is not result.best:
+        return "not its best pose alone, but the one that the other scans bear out"
+    return result.reason and f"weak alone ({result.reason}), but borne out by the other scans"
+
+
+def _overlap_share(evidence: Evidence) -> float:
+    """Share of all samples that lie on the other scan's surface."""
+    return evidence.agree + evidence.contradict
+
+
+def _verdict(graph: ViewGraph, scans: Mapping[str, ScanReport]) -> tuple[Verdict, tuple[str, ...]]:
+    if not graph.components:
+        return Verdict.NOTHING, ("no two scans could be registered to each other",)
+    by_verdict = {
+        kind: [name for name, scan in sorted(scans.items()) if scan.verdict is kind]
+        for kind in ScanVerdict
+    }
+    reasons = []
+    if by_verdict[ScanVerdict.DOUBTFUL]:
+        reasons.append(f"doubtful: {', '.join(by_verdict[ScanVerdict.DOUBTFUL])}")
+    if by_verdict[ScanVerdict.UNPLACED]:
+        reasons.append(f"not placed: {', '.join(by_verdict[ScanVerdict.UNPLACED])}")
+    if len(graph.components) > 1:
+        sizes = ", ".join(str(len(component.poses)) for component in graph.components)
+        reasons.append(f"the scans fall into {len(graph.components)} components of {sizes} scans")
+    if by_verdict[ScanVerdict.DOUBTFUL]:
+        return Verdict.DOUBTFUL, tuple(reasons)
+    return (Verdict.PARTIAL if reasons else Verdict.GOOD), tuple(reasons)

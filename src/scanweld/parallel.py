@@ -1,0 +1,41 @@
+"""Work over scans and pairs: the same results in the same order, whatever the number of workers."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def num_workers(asked: int | None) -> int:
+    """How many workers to use: as asked, else one for each core this process may run on."""
+    if asked is not None:
+        return max(1, asked)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def single_threaded_algebra() -> AbstractContextManager[object]:
+    """Pin BLAS and its like to one thread: sums then come out alike at any number of workers."""
+    return threadpool_limits(limits=1)
+
+
+def map_in_order(
+    function: Callable[[Item], Result], items: Sequence[Item], workers: int
+) -> Iterator[Result]:
+    """Results of a function over items, in the items' order, as they become ready.
+
+    Threads suffice: the compiled kernels, where the time goes, run without the interpreter's lock.
+    """
+    if workers == 1 or len(items) < 2:
+        yield from map(function, items)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            yield from pool.map(function, items)
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)

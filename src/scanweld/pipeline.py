@@ -1,0 +1,221 @@
+"""Scans -> reconstruction: the method from top to bottom."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from scanweld.config import Config
+from scanweld.errors import InputError
+from scanweld.fusion.fuse import fuse
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.scan import RangeScan
+from scanweld.heat.features import Features, describe
+from scanweld.intake import Intake, take_in
+from scanweld.multiview.assemble import build_view_graph
+from scanweld.multiview.merge import Judge
+from scanweld.multiview.refine import refine_poses
+from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.outcome import conclude
+from scanweld.pairs.anchors import pair_anchors
+from scanweld.pairs.field import ScanField, make_field
+from scanweld.pairs.register import register_pair
+from scanweld.pairs.result import Evidence, PairResult
+from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.parallel import num_workers, single_threaded_algebra
+from scanweld.progress import Cache, NoCache, Progress, silent
+from scanweld.reconstruction import Reconstruction
+from scanweld.stages import Stages, work_key
+
+logger = logging.getLogger(__name__)
+
+NUM_JUDGED_SAMPLES = 300
+NUM_SETTLING_ROUNDS = 3
+
+
+def run(
+    scans: Sequence[RangeScan],
+    config: Config | None = None,
+    *,
+    unreadable: Mapping[str, str] | None = None,
+    workers: int | None = None,
+    cache: Cache | None = None,
+    progress: Progress = silent,
+) -> Reconstruction:
+    """Register unordered scans, fuse them into one mesh and say how good both are.
+
+    Args:
+        scans: Scans of one rigid object in arbitrary frames, in any order, names unique.
+        config: Settings of every stage; the defaults if not given.
+        unreadable: Name -> reason of scans that could not even be read, for the report.
+        workers: Threads over scans and pairs; as many as there are cores if not given.
+        cache: Keeps finished work, so that an interrupted run goes on where it stopped.
+        progress: Called with (stage, done, total).
+
+    Returns:
+        The poses of the scans that could be placed, the mesh, and the report. Scans that could
+        not be placed are named in it with the reason.
+
+    Raises:
+        InputError: If fewer than two scans are usable.
+    """
+    config = config or Config()
+    stages = Stages(workers=num_workers(workers), cache=cache or NoCache(), progress=progress)
+    with single_threaded_algebra():
+        intake = take_in(scans, unreadable or {}, config, stages)
+        prepared, diameter = intake.prepared, intake.diameter
+        features = _describe(prepared, config, stages)
+        fields = stages.each("lay out", lambda scan: make_field(scan, diameter), prepared)
+        pairs = _register_pairs(intake, features, fields, config, stages)
+        graph = _build_graph(intake, fields, pairs, config, stages)
+        graph = _refine(intake, fields, graph, config, stages)
+        mesh = _fuse(prepared, graph, config, stages)
+        return conclude(intake, features, fields, graph, mesh, config, stages.reports)
+
+
+def _describe(
+    prepared: Sequence[PreparedScan], config: Config, stages: Stages
+) -> list[Features | None]:
+    """PA-HKS keypoints of every scan (paper 3.1), unless the settings do without."""
+    if config.pairs.keypoints == "even":
+        return [None] * len(prepared)
+    with stages.stage("features") as counts:
+        found = stages.each(
+            "features",
+            lambda scan: describe(scan, config.heat),
+            prepared,
+            lambda scan: work_key("features", scan.content_hash, config.prepare, config.heat),
+        )
+        counts["keypoints"] = sum(len(f.points) for f in found)
+    return list(found)
+
+
+def _register_pairs(
+    intake: Intake,
+    features: Sequence[Features | None],
+    fields: Sequence[ScanField],
+    config: Config,
+    stages: Stages,
+) -> dict[tuple[int, int], PairResult]:
+    """Judge every pair of scans from any start pose."""
+    edges = list(combinations(range(len(fields)), 2))
+    anchors = [
+        pair_anchors(field, found, intake.diameter, config.pairs)
+        for field, found in zip(fields, features, strict=True)
+    ]
+
+    def register(edge: tuple[int, int]) -> PairResult:
+        i, j = edge
+        both = list(zip(anchors[i], anchors[j], strict=True))
+        return register_pair(i, j, fields[i], fields[j], both, intake.diameter, config.pairs)
+
+    def key(edge: tuple[int, int]) -> str:
+        hashes = [intake.prepared[k].content_hash for k in edge]
+        settings = (config.prepare, config.heat, config.pairs)
+        return work_key("pair", *hashes, intake.diameter, *settings)
+
+    with stages.stage("pairs") as counts:
+        results = stages.each("pairs", register, edges, key)
+        counts["pairs"] = len(results)
+    return {
+        edge: replace(result, i=edge[0], j=edge[1])
+        for edge, result in zip(edges, results, strict=True)
+    }
+
+
+def _build_graph(
+    intake: Intake,
+    fields: Sequence[ScanField],
+    pairs: Mapping[tuple[int, int], PairResult],
+    config: Config,
+    stages: Stages,
+) -> ViewGraph:
+    """Place what the pairs can place together without contradiction."""
+    settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
+
+    def settle(poses: Mapping[int, Pose]) -> Mapping[int, Pose]:
+        return refine_poses(intake.prepared, poses, [], settling).poses
+
+    with stages.stage("graph") as counts:
+        graph = build_view_graph(
+            len(fields),
+            pairs,
+            [field.centre for field in fields],
+            intake.diameter,
+            make_judge(fields, intake.diameter, config),
+            settle,
+            config.graph,
+        )
+        counts["accepted"] = len(graph.accepted)
+        counts["components"] = len(graph.components)
+    return graph
+
+
+def make_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
+    """The evidence on any pair of scans at any pose, from a few hundred samples each."""
+    tolerance = config.pairs.tolerance_diameters[2] * diameter
+
+    def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
+        both = judge(fields[i], fields[j], i_from_j, tolerance, NUM_JUDGED_SAMPLES)
+        return mean_evidence(*both)
+
+    return judge_pair
+
+
+def _refine(
+    intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config, stages: Stages
+) -> ViewGraph:
+    """Refine each component's poses together (paper 3.2); the evidence must not suffer."""
+    judge_pair = make_judge(fields, intake.diameter, config)
+
+    def refine(component: Component) -> Component:
+        edges = [edge for edge in graph.accepted if edge[0] in component.poses]
+        start = dict(component.poses)
+        refined = dict(refine_poses(intake.prepared, start, edges, config.refine).poses)
+        if _support(refined, edges, judge_pair) < _support(start, edges, judge_pair) - 0.01:
+            logger.warning("the joint refinement made the evidence worse and is left out")
+            return component
+        to_reference = refined[component.reference].inverse()
+        poses = {k: to_reference @ pose for k, pose in refined.items()}
+        return replace(component, poses=poses)
+
+    with stages.stage("refine") as counts:
+        components = tuple(refine(component) for component in graph.components)
+        counts["scans"] = sum(len(component.poses) for component in components)
+    return replace(graph, components=components)
+
+
+def _support(
+    poses: Mapping[int, Pose], edges: Sequence[tuple[int, int]], judge_pair: Judge
+) -> float:
+    """Mean score of the accepted pairs at the given poses."""
+    scores = [judge_pair(i, j, poses[i].inverse() @ poses[j]).score for i, j in edges]
+    return float(np.mean(scores)) if scores else 0.0
+
+
+def _fuse(
+    prepared: Sequence[PreparedScan], graph: ViewGraph, config: Config, stages: Stages
+) -> TriangleMesh | None:
+    """The surface of the largest component, in the scan frame of its reference."""
+    if not graph.components:
+        return None
+    component = graph.components[0]
+    order = sorted(component.poses)
+    reference = prepared[component.reference].scan.scan_from_sensor
+    assert reference is not None
+    with stages.stage("fuse") as counts:
+        try:
+            mesh = fuse(
+                [prepared[k] for k in order],
+                [reference @ component.poses[k] for k in order],
+                config.fusion,
+            )
+        except InputError as error:
+            logger.warning("no model: %s", error)
+            return None
+        counts["faces"] = len(mesh.faces)
+    return mesh

@@ -1,0 +1,90 @@
+"""The bookkeeping of a run: stages timed and counted, finished work kept and found again."""
+
+import hashlib
+import logging
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import TypeVar
+
+from scanweld.config import Section
+from scanweld.parallel import map_in_order
+from scanweld.progress import Cache, Progress
+from scanweld.reconstruction import StageReport
+
+logger = logging.getLogger(__name__)
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(kw_only=True, slots=True)
+class Stages:
+    """Runs a pipeline's stages one after the other.
+
+    Attributes:
+        workers: Threads that work over scans and pairs.
+        cache: Where finished work is kept.
+        progress: Told of every finished item.
+        reports: Time, memory and counts of the stages so far.
+    """
+
+    workers: int
+    cache: Cache
+    progress: Progress
+    reports: dict[str, StageReport] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[dict[str, int | float]]:
+        """Time a stage; what is put into the yielded dict is reported as its counts."""
+        counts: dict[str, int | float] = {}
+        start = time.perf_counter()
+        self.progress(name, 0, 1)
+        yield counts
+        seconds = time.perf_counter() - start
+        self.reports[name] = StageReport(seconds=seconds, peak_mb=peak_memory_mb(), counts=counts)
+        self.progress(name, 1, 1)
+        told = ", ".join(f"{key} {value}" for key, value in counts.items())
+        logger.info("%s: %s (%.1f s)", name, told, seconds)
+
+    def each(
+        self,
+        name: str,
+        function: Callable[[Item], Result],
+        items: Sequence[Item],
+        key: Callable[[Item], str] | None = None,
+    ) -> list[Result]:
+        """Apply a function to every item, in parallel; with a key, finished items are kept."""
+
+        def finished(item: Item) -> Result:
+            if key is None:
+                return function(item)
+            kept = self.cache.get(key(item))
+            if kept is not None:
+                return kept  # type: ignore[return-value]  # what put() kept under the same key
+            result = function(item)
+            self.cache.put(key(item), result)
+            return result
+
+        results = []
+        for result in map_in_order(finished, items, self.workers):
+            results.append(result)
+            self.progress(name, len(results), len(items))
+        return results
+
+
+def work_key(stage: str, *parts: str | float | Section) -> str:
+    """A hex key of a piece of work: the stage, its input's hashes, its settings, our version."""
+    told = [version("scanweld"), stage]
+    told += [part.model_dump_json() if isinstance(part, Section) else repr(part) for part in parts]
+    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+
+
+def peak_memory_mb() -> float:
+    """Peak resident memory of this process so far."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (2**20 if sys.platform == "darwin" else 2**10)
