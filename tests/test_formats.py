@@ -13,6 +13,7 @@ from hypothesis.extra import numpy as nps
 from scanweld.errors import ReadError
 from scanweld.io import read_mesh, read_scan
 
+ODD = Path(__file__).parent / "odd"
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
@@ -200,3 +201,40 @@ def test_every_truncation_of_a_binary_stl_is_refused(tmp_path: Path) -> None:
         path.write_bytes(data[:size])
         with pytest.raises(ReadError):
             read_scan(path)
+
+
+SEEDS = {
+    **{path.name: path.read_bytes() for path in sorted(ODD.glob("*.ply"))},
+    "a.obj": obj_text(TETRAHEDRON, FACES).encode(),
+    "a.off": off_text(TETRAHEDRON, FACES).encode(),
+    "a.stl": stl_bytes(TETRAHEDRON[FACES]),
+    "a.xyz": b"3\n0 0 1 0 1 0\n1,0,2,1,0,0\n0;1;3;0;0;1\n",
+}
+
+
+@pytest.mark.filterwarnings("error")
+@settings(
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    name=st.sampled_from(sorted(SEEDS)),
+    edits=st.lists(
+        st.tuples(st.integers(0, 600), st.integers(0, 4), st.binary(max_size=3)),
+        min_size=1,
+        max_size=3,
+    ),
+)
+def test_damaged_files_give_a_scan_or_a_read_error(
+    name: str, edits: list[tuple[int, int, bytes]], tmp_path: Path
+) -> None:
+    data = SEEDS[name]
+    for at, length, instead in edits:
+        data = data[:at] + instead + data[at + length :]
+    path = tmp_path / name
+    path.write_bytes(data)
+    try:
+        scan = read_scan(path)
+    except ReadError as error:
+        assert "\n" not in str(error)
+    else:
+        assert len(scan.points) > 0
