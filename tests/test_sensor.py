@@ -232,6 +232,13 @@ def test_grid_that_does_not_fit_its_points_is_not_believed():
     assert angle_deg(viewing(found), pose.rotation[:, 2]) < 10
 
 
+def test_grid_of_one_row_or_one_point_is_not_believed():
+    scan = replace(organised(render(PINHOLE), any_pose(8)), grid=None)
+    row = np.arange(len(scan.points))[None]
+    for grid in (row, np.zeros((20, 20), dtype=int), np.full((20, 20), -1)):
+        assert locate_sensor(replace(scan, grid=grid)).viewpoint is Viewpoint.ESTIMATED
+
+
 def test_given_sensor_is_kept():
     given_scan = replace(
         organised(render(PINHOLE), Pose.identity()),
