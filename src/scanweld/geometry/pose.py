@@ -56,7 +56,8 @@ class Pose:
     def log(self) -> FloatArray:
         """The twist (6,) whose ``exp`` this is; rotation angle in [0, pi]."""
         w = rotation_log(self.rotation)
-        return np.concatenate([w, np.linalg.solve(_left_jacobian(w), self.translation)])
+        generator: FloatArray = np.linalg.solve(_left_jacobian(w), self.translation)
+        return np.concatenate([w, generator])
 
     def __matmul__(self, other: "Pose") -> "Pose":
         return Pose(
@@ -136,7 +137,7 @@ def rotation_between(a: FloatArray, b: FloatArray) -> FloatArray:
     cosine = float(a @ b)
     if cosine < -1 + 1e-12:
         other = np.eye(3)[int(np.argmin(np.abs(a)))]
-        axis = np.cross(a, other)
+        axis = np.cross(a, other).astype(np.float64)
         return rotation_exp(np.pi * axis / np.linalg.norm(axis))
     k = _cross(np.cross(a, b))
     return nearest_rotation(np.eye(3) + k + k @ k / (1 + cosine))

@@ -76,15 +76,14 @@ def _closest_points(
     span = vertices.max(axis=0) + GRID_MARGIN_DIAMETERS * diameter - origin
     shape = np.ceil(span / edge).astype(np.int64) + 1
     cell = np.rint((vertices - origin) / edge).astype(np.int64)
-    flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
+    flat = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
     chosen = _representatives(flat, vertices - origin - cell * edge, off_rim)
     normals = np.asarray(scan.mesh.normals)
     surface = np.column_stack([vertices, normals, off_rim])[chosen].astype(np.float64)
 
     index = np.full(shape, -1, dtype=np.int32)
     index.ravel()[flat[chosen]] = np.arange(len(chosen), dtype=np.int32)
-    nearest = ndimage.distance_transform_edt(index < 0, return_distances=False, return_indices=True)
-    assert isinstance(nearest, np.ndarray)
+    _, nearest = ndimage.distance_transform_edt(index < 0, return_indices=True)
     closest = index[tuple(nearest)]
     return np.ascontiguousarray(surface), np.ascontiguousarray(closest), np.append(origin, edge)
 

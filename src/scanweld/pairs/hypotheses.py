@@ -47,10 +47,11 @@ class Anchors:
         """(K, 12): for each anchor a rotation whose third column is the normal, then the point."""
         n = self.normals
         least = np.eye(3)[np.argmin(np.abs(n), axis=1)]
-        x = np.cross(least, n)
+        x = np.cross(least, n).astype(np.float64)
         x /= np.linalg.norm(x, axis=1, keepdims=True)
         rotation = np.stack([x, np.cross(n, x), n], axis=2)
-        return np.ascontiguousarray(np.column_stack([rotation.reshape(-1, 9), self.points]))
+        rows = np.column_stack([rotation.reshape(-1, 9), self.points])
+        return np.ascontiguousarray(rows, dtype=np.float64)
 
 
 def sweep(

@@ -20,6 +20,7 @@ MIN_PIECE_SHARE = 0.002
 MAX_EDGE_PIXELS = 4.0
 POINT_PIXELS = 1.6
 NORMAL_SMOOTHING_ROUNDS = 2
+PINHOLE_ROUNDS = 2
 
 
 def make_range_image(
@@ -46,7 +47,9 @@ def make_range_image(
         faces = _scan_faces(scan, points, pixel, config)
         depth, _ = render_depth(points, faces, camera)
     else:
-        depth = _splat(points, camera, config.jump_pixels * pixel)
+        depth = _splat(points, camera)
+    for _ in range(PINHOLE_ROUNDS):
+        depth = _fill_pinholes(depth, config.jump_pixels * pixel)
     depth, mesh = _surface(depth, camera, pixel, config)
     kind, outside = classify_pixels(
         np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
@@ -101,19 +104,18 @@ def _scan_faces(
     return grid_faces(scan.grid, points, points[:, 2], max_step, MAX_EDGE_PIXELS * pixel)
 
 
-def _splat(points: FloatArray, camera: Camera, max_step: float) -> FloatArray:
+def _splat(points: FloatArray, camera: Camera) -> FloatArray:
     """Nearest depth of the points in each pixel; small gaps within a surface are filled."""
     pixels, z = camera.project(points)
     u, v = np.rint(pixels).astype(np.int64).T
     depth = np.full((camera.height, camera.width), np.inf)
     np.minimum.at(depth, (v, u), z)
     depth[np.isinf(depth)] = np.nan
-    for _ in range(2):
-        depth = _fill_pinholes(depth, max_step)
     return depth
 
 
 def _fill_pinholes(depth: FloatArray, max_step: float) -> FloatArray:
+    """Fill empty pixels most of whose neighbours are one surface: lost returns, gaps of a splat."""
     has = np.isfinite(depth)
     box = np.ones((3, 3))
     count = ndimage.convolve(has.astype(np.float64), box, mode="constant")

@@ -24,11 +24,12 @@ def classify_pixels(
         Kinds (H, W) and distances (H, W) in pixels, 0 inside the silhouette.
     """
     silhouette = close(is_surface, closing_pixels)
-    silhouette = ndimage.binary_fill_holes(silhouette | ~in_view) & (silhouette | in_view)
+    filled = np.asarray(ndimage.binary_fill_holes(silhouette | ~in_view), dtype=np.bool_)
+    silhouette = filled & (silhouette | in_view)
     kind = np.full(is_surface.shape, PixelKind.UNKNOWN, dtype=np.uint8)
     kind[~silhouette & in_view] = PixelKind.FREE
     kind[is_surface] = PixelKind.SURFACE
-    outside = ndimage.distance_transform_edt(~silhouette)
+    outside = distance_to(silhouette)
     return kind, np.where(kind == PixelKind.FREE, outside, 0.0)
 
 
@@ -36,5 +37,10 @@ def close(mask: BoolArray, radius: float) -> BoolArray:
     """Morphological closing (H, W) by a disc: grown by the radius, then shrunk by it."""
     if radius <= 0 or not mask.any():
         return mask.copy()
-    grown = ndimage.distance_transform_edt(~mask) <= radius
-    return (ndimage.distance_transform_edt(grown) > radius) | mask
+    grown = distance_to(mask) <= radius
+    return (distance_to(~grown) > radius) | mask
+
+
+def distance_to(mask: BoolArray) -> FloatArray:
+    """Distance (H, W) in pixels to the nearest pixel of a mask."""
+    return np.asarray(ndimage.distance_transform_edt(~mask), dtype=np.float64)
