@@ -1,1 +1,51 @@
-"""scanweld: unordered range scans of an object to one registered, fused model and a verdict."""
+"""scanweld: unordered range scans of an object to one registered, fused model and a verdict.
+
+    scans = scanweld.read_scans("scans/")
+    result = scanweld.run(scans)
+    print(result.verdict, result.poses)
+"""
+
+from scanweld.config import Config, load_config
+from scanweld.errors import ScanweldError
+from scanweld.evaluation.metrics import evaluate_poses
+from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io import (
+    PoseSet,
+    read_mesh,
+    read_poses,
+    read_scan,
+    write_mesh_ply,
+    write_poses,
+    write_scan_ply,
+)
+from scanweld.io.scans import read_scans
+from scanweld.pipeline import run
+from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+
+__all__ = [
+    "Camera",
+    "CameraModel",
+    "Config",
+    "Pose",
+    "PoseSet",
+    "RangeScan",
+    "Reconstruction",
+    "ScanVerdict",
+    "ScanweldError",
+    "TriangleMesh",
+    "Verdict",
+    "Viewpoint",
+    "evaluate_poses",
+    "load_config",
+    "read_mesh",
+    "read_poses",
+    "read_scan",
+    "read_scans",
+    "run",
+    "write_mesh_ply",
+    "write_poses",
+    "write_scan_ply",
+]
