@@ -27,8 +27,8 @@ NOISE_FLOOR = 1e-7
 DAMPING = 1e-7
 """Added to the diagonal, relative to its mean: what no match holds stays where it is."""
 
-ContourMatcher = Callable[[PreparedScan, PreparedScan, Pose], Matches]
-"""Contour matches of scans i and j at the pose ``j_from_i``, in the sensor frame of j."""
+ContourMatcher = Callable[[int, int, Pose], Matches]
+"""Contour matches of scans i and j, by index, at the pose ``j_from_i``: in the frame of j."""
 _Found = tuple[int, int, Matches]
 
 
@@ -106,7 +106,7 @@ def refine_poses(
         surface = _match_surfaces(sources, poses, float(radius) * diameter)
         contour: list[_Found] = []
         if contour_matches is not None and config.contour_weight > 0:
-            contour = _match_contours(scans, poses, views, contour_matches)
+            contour = _match_contours(poses, views, contour_matches)
         terms = _weighted(surface, contour, poses, config.contour_weight, diameter)
         poses, moved = _solve(terms, poses, diameter)
         step = moved / diameter
@@ -130,7 +130,6 @@ def _match_surfaces(
 
 
 def _match_contours(
-    scans: Sequence[PreparedScan],
     poses: Mapping[int, Pose],
     views: Sequence[tuple[int, int]],
     contour_matches: ContourMatcher,
@@ -138,7 +137,7 @@ def _match_contours(
     found = []
     for pair in views:
         for i, j in (pair, pair[::-1]):
-            matches = contour_matches(scans[i], scans[j], poses[j].inverse() @ poses[i])
+            matches = contour_matches(i, j, poses[j].inverse() @ poses[i])
             if len(matches) >= MIN_MATCHES:
                 found.append((i, j, matches))
     return found
