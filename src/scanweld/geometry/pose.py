@@ -56,7 +56,7 @@ class Pose:
     def log(self) -> FloatArray:
         """The twist (6,) whose ``exp`` this is; rotation angle in [0, pi]."""
         w = rotation_log(self.rotation)
-        generator: FloatArray = np.linalg.solve(_left_jacobian(w), self.translation)
+        generator = np.linalg.solve(_left_jacobian(w), self.translation).astype(np.float64)
         return np.concatenate([w, generator])
 
     def __matmul__(self, other: "Pose") -> "Pose":

@@ -8,6 +8,7 @@ import numpy as np
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, frozen
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 
 
@@ -97,6 +98,13 @@ class PreparedScan:
     resolution: float
     diameter: float
     content_hash: str
+
+    @property
+    def scan_from_sensor(self) -> Pose:
+        """Where the sensor stood: given, fitted or estimated."""
+        if self.scan.scan_from_sensor is None:
+            raise ValueError("a prepared scan has a located sensor")
+        return self.scan.scan_from_sensor
 
     @property
     def name(self) -> str:

@@ -83,7 +83,10 @@ def _closest_points(
 
     index = np.full(shape, -1, dtype=np.int32)
     index.ravel()[flat[chosen]] = np.arange(len(chosen), dtype=np.int32)
-    _, nearest = ndimage.distance_transform_edt(index < 0, return_indices=True)
+    nearest = np.zeros((3, *shape), dtype=np.int32)
+    ndimage.distance_transform_edt(
+        index < 0, return_distances=False, return_indices=True, indices=nearest
+    )
     closest = index[tuple(nearest)]
     return np.ascontiguousarray(surface), np.ascontiguousarray(closest), np.append(origin, edge)
 
