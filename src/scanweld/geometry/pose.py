@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 
 from scanweld.geometry.arrays import FloatArray, frozen
 
+_IDENTITY = np.eye(3)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Pose:
@@ -25,8 +27,7 @@ class Pose:
         object.__setattr__(self, "translation", frozen(self.translation, np.float64, (3,)))
         if not np.isfinite(self.translation).all():
             raise ValueError("a pose needs a finite translation")
-        gram = self.rotation @ self.rotation.T
-        if not np.allclose(gram, np.eye(3), atol=1e-6) or np.linalg.det(self.rotation) < 0:
+        if not _is_rotation(self.rotation):
             raise ValueError("a pose needs a rotation: orthonormal, with determinant +1")
 
     @staticmethod
@@ -61,7 +62,7 @@ class Pose:
 
     def __matmul__(self, other: "Pose") -> "Pose":
         return Pose(
-            rotation=nearest_rotation(self.rotation @ other.rotation),
+            rotation=_straightened(self.rotation @ other.rotation),
             translation=self.rotation @ other.translation + self.translation,
         )
 
@@ -155,6 +156,18 @@ def random_rotation(rng: np.random.Generator) -> FloatArray:
             ]
         )
     )
+
+
+def _is_rotation(matrix: FloatArray) -> bool:
+    # Written out: poses are made by the ten thousand while components grow.
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return det > 0 and float(np.abs(matrix @ matrix.T - _IDENTITY).max()) < 1e-6
+
+
+def _straightened(matrix: FloatArray) -> FloatArray:
+    """One Newton step to the nearest rotation: keeps products orthonormal to rounding."""
+    return 1.5 * matrix - 0.5 * matrix @ (matrix.T @ matrix)
 
 
 def _cross(v: FloatArray) -> FloatArray:
