@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.linalg import ArpackError
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
@@ -34,8 +34,7 @@ class Features:
         signatures: (K, T) log of the heat signature over the heat trace.
         strengths: (K,) how far the log signature rises above its mean over the mesh.
         times: (T,) diffusion times in squared diameters.
-        found_at: (K, 3) where the maximum was found on the artificial mesh, before it was moved to
-            the front surface.
+        found_at: (K, 3) where the maximum was found on the front, before it was moved off a rim.
     """
 
     points: FloatArray
@@ -78,23 +77,27 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
         return _no_features(config.num_times)
     times = diffusion_times(eigenvalues, config.num_times, config.longest_time_diameters2)
     signature = heat_signature(eigenvalues, functions, times)
-    maxima = persistent_maxima(signature, vertices, mesh.faces, config.group_diameters)
+    # Heat on walls and back says where the sensor stood: only the front's own maxima are taken.
+    surface = signature[: mesh.num_front]
+    maxima = persistent_maxima(
+        surface, front.points / scan.diameter, front.faces, config.group_diameters
+    )
     reach = config.group_diameters * scan.diameter
-    anchors, is_kept = _move_to_front(front, scan.image, mesh.front_of[maxima.vertices], reach)
+    anchors, is_kept = _move_off_rims(front, scan.image, maxima.vertices, reach)
     found, strengths = maxima.vertices[is_kept], maxima.strengths[is_kept]
-    chosen = group(front.points[anchors], signature[anchors], strengths, reach)
+    chosen = group(front.points[anchors], surface[anchors], strengths, reach)
     rows, columns = front.pixels[anchors[chosen]].T
     return Features(
         points=front.points[anchors[chosen]],
         normals=scan.image.normals[rows, columns],
-        signatures=signature[anchors[chosen]],
+        signatures=surface[anchors[chosen]],
         strengths=strengths[chosen],
         times=times,
-        found_at=mesh.vertices[found[chosen]],
+        found_at=front.points[found[chosen]],
     )
 
 
-def _move_to_front(
+def _move_off_rims(
     front: FrontMesh, image: RangeImage, at: IntArray, reach: float
 ) -> tuple[IntArray, BoolArray]:
     """The nearest front vertices that can be anchors, and which of the given ones (K,) have one.
@@ -109,7 +112,7 @@ def _move_to_front(
     usable = np.flatnonzero(~image.is_rim[rows, columns] & (toward > _MIN_COSINE))
     if len(usable) == 0 or len(at) == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(len(at), dtype=bool)
-    distance, nearest = cKDTree(front.points[usable]).query(front.points[at])
+    distance, nearest = map(np.atleast_1d, KDTree(front.points[usable]).query(front.points[at]))
     is_kept = distance < reach
     return usable[nearest[is_kept]], is_kept
 

@@ -1,7 +1,7 @@
 """The measured surface as a coarse triangle mesh: a thinned range image, cut at depth jumps."""
 
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, pairwise
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -62,7 +62,7 @@ def thin_front(image: RangeImage, max_vertices: int) -> FrontMesh:
 
 
 def _bridge_dropouts(depth: FloatArray, jump: float) -> FloatArray:
-    """Depths with small holes filled from the two sides of their row or column, where these agree."""
+    """Depths with small holes filled from both sides of their row or column, where these agree."""
     for _ in range(_DROPOUT_PIXELS):
         padded = np.pad(depth, 1, constant_values=np.nan)
         filled = depth.copy()
@@ -111,9 +111,7 @@ def _cell_triangles(depth: FloatArray, stride: int, jump: float) -> IntArray:
         path = [depth[row + k * down, column + k * along] for k in range(stride + 1)]
         longest = jump * np.hypot(down, along)
         with np.errstate(invalid="ignore"):
-            return np.all(
-                [np.abs(b - a) < longest for a, b in zip(path, path[1:], strict=False)], 0
-            )
+            return np.all([np.abs(b - a) < longest for a, b in pairwise(path)], 0)
 
     sides = {
         "t": joined(top, left, 0, 1),
@@ -123,9 +121,8 @@ def _cell_triangles(depth: FloatArray, stride: int, jump: float) -> IntArray:
         "falling": joined(top, left, 1, 1),
         "rising": joined(bottom, left, -1, 1),
     }
-    tl, bl, br, tr = (
-        r * width + c for r, c in ((top, left), (bottom, left), (bottom, right), (top, right))
-    )
+    tl, bl = top * width + left, bottom * width + left
+    br, tr = bottom * width + right, top * width + right
     cells = np.full((*top.shape, 2, 3), -1, dtype=np.int64)
     halves = (
         (0, (tl, bl, br), "l", "b", "falling"),

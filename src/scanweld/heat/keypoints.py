@@ -4,95 +4,103 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 # A maximum must be found again at so many successive times.
-_MIN_SCALES = 2
+_MIN_TIMES = 2
 # Signatures (log) are alike below this root mean square difference.
 _ALIKE = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Maxima:
-    """Local maxima of a signature on a mesh.
+    """Persistent maxima of a signature.
 
     Attributes:
-        vertices: (K,), ascending.
-        strengths: (K,) excess of the log signature over its mean, averaged over the maximum's times.
+        vertices: (K,) where the shortest of a maximum's times has it.
+        strengths: (K,) excess of the log signature over its mean, averaged over those times.
     """
 
     vertices: IntArray
     strengths: FloatArray
 
 
-def persistent_maxima(
-    signature: FloatArray, vertices: FloatArray, faces: IntArray, radius: float
-) -> Maxima:
-    """Vertices that are local maxima at successive times; one for each chain over the times.
+@dataclass
+class _Chain:
+    """A maximum followed over times: where it is at each."""
 
-    A maximum goes on where the next time has one within ``radius``; the chain is placed where the
-    shortest of its times has it.
+    first_time: int
+    vertices: list[int]
+
+
+def persistent_maxima(
+    signature: FloatArray, points: FloatArray, faces: IntArray, radius: float
+) -> Maxima:
+    """Points of a surface whose signature is the highest around, at successive times.
 
     Args:
-        signature: (V, T) log heat signature.
-        vertices: (V, 3).
+        signature: (N, T) log heat signature.
+        points: (N, 3).
         faces: (F, 3).
-        radius: In the vertices' unit.
+        radius: How far around, and how far a maximum may move from one time to the next, in the
+            points' unit. Neighbours on the surface always count as around.
     """
-    is_maximum = _local_maxima(signature, faces)
-    excess = signature - signature.mean(axis=0)
-    at, chain_sum, chain_length = _starts(is_maximum[:, 0], excess[:, 0])
-    done: list[tuple[IntArray, FloatArray, IntArray]] = []
-    place = at
-    for time in range(1, signature.shape[1]):
+    is_maximum = _local_maxima(signature, points, faces, radius)
+    chains: list[_Chain] = []
+    current: list[_Chain] = []
+    for time in range(signature.shape[1]):
         now = np.flatnonzero(is_maximum[:, time])
-        follower = _follow(vertices[place], vertices[now], radius)
-        goes_on = follower >= 0
-        done.append((at[~goes_on], chain_sum[~goes_on], chain_length[~goes_on]))
-        is_new = np.ones(len(now), dtype=bool)
-        is_new[follower[goes_on]] = False
-        new = now[is_new]
-        place = np.concatenate([now[follower[goes_on]], new])
-        at = np.concatenate([at[goes_on], new])
-        chain_sum = np.concatenate([chain_sum[goes_on], np.zeros(len(new))]) + excess[place, time]
-        chain_length = np.concatenate([chain_length[goes_on], np.zeros(len(new), np.int64)]) + 1
-    done.append((at, chain_sum, chain_length))
-    at, chain_sum, chain_length = (np.concatenate(part) for part in zip(*done, strict=True))
-    kept = chain_length >= _MIN_SCALES
-    order = np.flatnonzero(kept)[np.argsort(at[kept], kind="stable")]
-    return Maxima(vertices=at[order], strengths=chain_sum[order] / chain_length[order])
+        last = np.array([chain.vertices[-1] for chain in current], dtype=np.int64)
+        follower = _follow(points[last], points[now], radius)
+        going = []
+        for chain, k in zip(current, follower, strict=True):
+            if k >= 0:
+                chain.vertices.append(int(now[k]))
+                going.append(chain)
+        starting = [_Chain(time, [int(v)]) for v in np.delete(now, follower[follower >= 0])]
+        chains += starting
+        current = going + starting
+    kept = [chain for chain in chains if len(chain.vertices) >= _MIN_TIMES]
+    excess = signature - signature.mean(axis=0)
+    return Maxima(
+        vertices=np.array([chain.vertices[0] for chain in kept], dtype=np.int64),
+        strengths=np.array([_mean_along(excess, chain) for chain in kept], dtype=np.float64),
+    )
 
 
-def _starts(is_maximum: BoolArray, excess: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:
-    at = np.flatnonzero(is_maximum)
-    return at, excess[at], np.ones(len(at), dtype=np.int64)
+def _mean_along(values: FloatArray, chain: _Chain) -> float:
+    times = chain.first_time + np.arange(len(chain.vertices))
+    return float(values[chain.vertices, times].mean())
 
 
 def _follow(points: FloatArray, candidates: FloatArray, radius: float) -> IntArray:
-    """For each point (N,) the nearest candidate within the radius, -1 if none or taken by a nearer."""
+    """The nearest candidate within the radius of each point (N,); -1 if none, or another has it."""
     if len(points) == 0 or len(candidates) == 0:
         return np.full(len(points), -1, dtype=np.int64)
-    distance, nearest = cKDTree(candidates).query(points, distance_upper_bound=radius)
-    follower = np.where(np.isfinite(distance), nearest, -1).astype(np.int64)
+    distance, nearest = map(np.atleast_1d, KDTree(candidates).query(points))
     order = np.argsort(distance, kind="stable")
-    _, first = np.unique(follower[order], return_index=True)
+    _, first = np.unique(nearest[order], return_index=True)
     is_first = np.zeros(len(points), dtype=bool)
     is_first[order[first]] = True
-    return np.where(is_first, follower, -1)
+    return np.where(is_first & (distance < radius), nearest, -1)
 
 
-def _local_maxima(signature: FloatArray, faces: IntArray) -> BoolArray:
-    """Where (V, T) the signature is larger than at all neighbours of the mesh."""
-    num = len(signature)
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    ends = np.concatenate([start, end]), np.concatenate([end, start])
-    graph = coo_array((np.ones(len(ends[0])), ends), shape=(num, num)).tocsr()
-    has_neighbours = np.diff(graph.indptr) > 0
+def _local_maxima(
+    signature: FloatArray, points: FloatArray, faces: IntArray, radius: float
+) -> BoolArray:
+    """Where (N, T) the signature is higher than all around; a tie has no maximum."""
+    num = len(points)
+    near = KDTree(points).query_pairs(radius, output_type="ndarray")
+    sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    pairs = np.concatenate([near, sides])
+    ends = np.concatenate([pairs, pairs[:, ::-1]]).T
+    around = coo_array((np.ones(ends.shape[1]), (ends[0], ends[1])), shape=(num, num)).tocsr()
+    has_any = np.diff(around.indptr) > 0
     highest = np.full(signature.shape, np.inf)
-    highest[has_neighbours] = np.maximum.reduceat(
-        signature[graph.indices], graph.indptr[:-1][has_neighbours]
+    highest[has_any] = np.maximum.reduceat(
+        signature[around.indices], around.indptr[:-1][has_any], axis=0
     )
     return signature > highest
 
@@ -102,7 +110,7 @@ def group(
 ) -> IntArray:
     """Indices of one keypoint of each group, strongest first.
 
-    A keypoint falls to a stronger one that is nearer than ``radius`` and has a like signature.
+    A keypoint falls to a stronger one that is nearer than the radius and has a like signature.
 
     Args:
         points: (K, 3).

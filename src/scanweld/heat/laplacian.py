@@ -37,12 +37,8 @@ def eigenpairs(
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
+    # scipy's stubs know only the base class's constructor.
+    inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)  # pyright: ignore[reportCallIssue]
     start = np.random.default_rng(_START_SEED).standard_normal(n)
-    values, vectors = eigsh(
-        operator,
-        k=num_modes,
-        sigma=-_SHIFT,
-        v0=start,
-        OPinv=LinearOperator((n, n), matvec=factors.solve, dtype=np.float64),
-    )
+    values, vectors = eigsh(operator, k=num_modes, sigma=-_SHIFT, v0=start, OPinv=inverse)
     return np.maximum(values, 0.0), weight @ vectors
