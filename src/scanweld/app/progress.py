@@ -47,12 +47,14 @@ class Drawing:
     def __init__(self, bars: Bars) -> None:
         self._bars = bars
         self._tasks: dict[str, TaskID] = {}
+        self._totals: dict[str, int] = {}
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Move the stage's bar."""
+        """Move the stage's bar; a stage that counts items keeps their number to its end."""
         if stage not in self._tasks:
-            self._tasks[stage] = self._bars.add_task(stage, total=total)
-        self._bars.update(self._tasks[stage], completed=done, total=total)
+            self._tasks[stage] = self._bars.add_task(stage)
+        most = self._totals[stage] = max(total, self._totals.get(stage, 0))
+        self._bars.update(self._tasks[stage], completed=most if done == total else done, total=most)
 
 
 def _handler(console: Console) -> logging.Handler:

@@ -1,0 +1,132 @@
+"""One folder with everything that can be wrong with a file, beside the scans of one object."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scanweld.app.cli import main
+from scanweld.evaluation.metrics import Standing, evaluate_poses
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import read_poses, write_scan_ply
+from tests.scenes import Scene, creature_scene
+
+GOOD = ["scan_01", "scan_02", "scan_03", "scan_04", "scan_05", "scan_06"]
+IN_MILLIMETRES = 1000.0
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return creature_scene(6, pixels=140)
+
+
+@pytest.fixture(scope="module")
+def folder(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    folder = tmp_path_factory.mktemp("bad") / "scans"
+    folder.mkdir()
+    for scan in scene.scans:
+        write_scan_ply(folder / f"{scan.name}.ply", scan)
+    whole = (folder / "scan_01.ply").read_bytes()
+    shutil.copy(folder / "scan_02.ply", folder / "scan_02_copy.ply")
+    (folder / "truncated.ply").write_bytes(whole[: len(whole) // 2])
+    (folder / "empty.ply").write_bytes(b"")
+    (folder / "text.ply").write_text("Dear diary, today I scanned a creature.\n")
+    (folder / "ten_points.xyz").write_text("\n".join(f"{k} {k * k} {-k}" for k in range(10)))
+    write_scan_ply(folder / "millimetres.ply", scaled(scene.scans[2], IN_MILLIMETRES))
+    other = creature_scene(3, pixels=140, object_seed=5).scans[1]
+    write_scan_ply(folder / "stranger.ply", replace(other, name="stranger"))
+    with (folder / "scan_05.ply").open("rb") as file:
+        assert b"format binary" in file.read(100)
+    with_holes(folder / "scan_05.ply", scene.scans[4])
+    yield folder
+
+
+def scaled(scan: RangeScan, scale: float) -> RangeScan:
+    assert scan.scan_from_sensor is not None
+    pose = scan.scan_from_sensor
+    moved = Pose(rotation=pose.rotation, translation=scale * pose.translation)
+    return replace(scan, points=scale * scan.points, scan_from_sensor=moved)
+
+
+def with_holes(path: Path, scan: RangeScan) -> None:
+    """The scan as ASCII, some points not finite."""
+    points = np.array(scan.points)
+    points[7] = np.nan
+    points[11, 1] = np.inf
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(points)}"]
+    lines += [f"property float {axis}" for axis in "xyz"]
+    lines += ["end_header", *(" ".join(f"{x:.9g}" for x in point) for point in points)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def outcome(folder: Path) -> tuple[int, Path]:
+    model = folder.parent / "model"
+    with pytest.raises(SystemExit) as left:
+        main(["run", str(folder), "-o", str(model), "-q"])
+    assert isinstance(left.value.code, int)
+    return left.value.code, model
+
+
+def load(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def test_the_rest_goes_on_and_the_exit_code_tells(outcome: tuple[int, Path]):
+    code, model = outcome
+    assert code == 3
+    assert (model / "model.ply").exists()
+    assert load(model / "report.json")["verdict"] == "partial"
+
+
+def test_the_good_scans_are_placed_rightly(outcome: tuple[int, Path], scene: Scene):
+    estimate = read_poses(outcome[1] / "poses.json")
+    assert sorted(estimate.poses) == GOOD
+    centroids = {scan.name: scan.points.mean(axis=0) for scan in scene.scans}
+    errors = evaluate_poses(estimate, scene.world_from_scan, centroids=centroids, diameter=170.0)
+    assert errors.count(Standing.RIGHT) == len(GOOD)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("empty", "the file is empty"),
+        ("text", "not a PLY file"),
+        ("truncated", "truncated.ply"),
+        ("ten_points", "10 points"),
+        ("scan_02_copy", "same content as scan_02"),
+        ("millimetres", "1e+03 times larger than the other scans; units mixed up (m and mm)?"),
+        ("stranger", "no pair with another scan holds"),
+    ],
+)
+def test_what_cannot_be_used_is_named_with_the_reason(
+    outcome: tuple[int, Path], name: str, says: str
+):
+    unplaced = load(outcome[1] / "poses.json")["unplaced"]
+    assert says in unplaced[name]
+    report = load(outcome[1] / "report.json")["scans"][name]
+    assert (report["verdict"], report["reason"]) == ("unplaced", unplaced[name])
+
+
+def test_nothing_else_is_unplaced(outcome: tuple[int, Path]):
+    assert len(load(outcome[1] / "poses.json")["unplaced"]) == 7
+
+
+def test_points_that_are_not_finite_are_dropped_and_counted(outcome: tuple[int, Path]):
+    scans = load(outcome[1] / "report.json")["scans"]
+    assert scans["scan_05"]["num_dropped"] == 2
+    assert scans["scan_04"]["num_dropped"] == 0
+
+
+def test_every_pair_is_reported_once_in_the_order_of_names(outcome: tuple[int, Path]):
+    pairs = load(outcome[1] / "graph.json")["pairs"]
+    registered = sorted([*GOOD, "stranger"])
+    assert [(pair["i"], pair["j"]) for pair in pairs] == [
+        (i, j) for i in registered for j in registered if i < j
+    ]
