@@ -45,6 +45,8 @@ class Pose:
             m[:3, :3] @ m[:3, :3].T, np.eye(3), atol=1e-3
         ):
             raise ValueError("the 4x4 matrix is not a rigid motion")
+        if np.linalg.det(m[:3, :3]) < 0:
+            raise ValueError("the 4x4 matrix is not a rigid motion: it mirrors")
         return Pose(rotation=nearest_rotation(m[:3, :3]), translation=m[:3, 3])
 
     @staticmethod
