@@ -1,0 +1,120 @@
+"""Settings: defaults, files, ranges, and one clear line where something is wrong."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from scanweld.config import Config, PairsConfig, Section, load_config
+from scanweld.errors import ConfigError
+
+CHANGED = Config(
+    seed=7,
+    unit="mm",
+    pairs=PairsConfig(
+        keypoints="even", num_turns=36, tolerance_diameters=(0.05, 0.03, 0.01), min_margin=0.25
+    ),
+)
+
+
+def refusal(tmp_path: Path, text: str) -> str:
+    """The message with which a settings file is refused; one line that names the file."""
+    path = tmp_path / "my settings.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as raised:
+        load_config(path)
+    told = str(raised.value)
+    assert told.startswith(f"{path}: ") and len(told.splitlines()) == 1
+    return told
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("sed = 1", "sed"),
+        ("[pairs]\nmin_scores = 0.1", "pairs.min_scores"),
+        ("[pears]\nmin_score = 0.1", "pears"),
+        ("[fusion.more]\nx = 1", "fusion.more"),
+    ],
+)
+def test_an_unknown_setting_is_named(tmp_path: Path, text: str, place: str):
+    assert f": {place}: " in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("seed = -1", "seed"),
+        ("[pairs]\nmin_score = 1.5", "pairs.min_score"),
+        ("[pairs]\nnum_turns = 2", "pairs.num_turns"),
+        ("[pairs]\nkeypoints = 'sift'", "pairs.keypoints"),
+        ("[pairs]\ntolerance_diameters = [0.04, 0.02]", "pairs.tolerance_diameters.2"),
+        ("[prepare]\nnum_samples = 'many'", "prepare.num_samples"),
+        ("[prepare]\nimage_pixels = 100.5", "prepare.image_pixels"),
+        ("[contours]\ntrim = 0.0", "contours.trim"),
+        ("unit = 'furlong'", "unit"),
+        ("pairs = 3", "pairs"),
+    ],
+)
+def test_a_setting_out_of_its_range_is_named(tmp_path: Path, text: str, place: str):
+    assert f": {place}: " in refusal(tmp_path, text)
+
+
+@pytest.mark.parametrize("text", ["seed = ", "[pairs", "seed = 1\nseed = 2", "= 3", "a b c\n" * 3])
+def test_text_that_is_no_toml_is_refused(tmp_path: Path, text: str):
+    assert "TOML" in refusal(tmp_path, text)
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path):
+    path = tmp_path / "binary.toml"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(ConfigError, match=r"binary\.toml"):
+        load_config(path)
+
+
+@pytest.mark.parametrize("missing", ["none.toml", "."])
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, missing: str):
+    with pytest.raises(ConfigError) as raised:
+        load_config(tmp_path / missing)
+    assert str(tmp_path / missing) in str(raised.value)
+
+
+@pytest.mark.parametrize("config", [Config(), CHANGED])
+def test_toml_round_trip(tmp_path: Path, config: Config):
+    path = tmp_path / "config.toml"
+    path.write_text(config.to_toml(), encoding="utf-8")
+    assert load_config(path) == config
+
+
+def test_written_settings_are_complete():
+    told = tomllib.loads(CHANGED.to_toml())
+    assert told["seed"] == 7 and told["unit"] == "mm"
+    assert told["pairs"]["tolerance_diameters"] == [0.05, 0.03, 0.01]
+    for name, section in Config():
+        if isinstance(section, Section):
+            assert set(told[name]) == set(type(section).model_fields)
+    assert "unit" not in tomllib.loads(Config().to_toml())
+
+
+def test_defaults_then_file_then_overrides(tmp_path: Path):
+    path = tmp_path / "config.toml"
+    path.write_text("seed = 3\nunit = 'cm'\n[graph]\nmin_margin = 0.5\n", encoding="utf-8")
+    config = load_config(path, seed=4, unit=None)
+    assert config.seed == 4
+    assert config.unit == "cm"
+    assert config.graph.min_margin == 0.5
+    assert config.graph.max_violation == Config().graph.max_violation
+    assert load_config(None) == Config()
+
+
+def test_a_wrong_override_is_refused():
+    with pytest.raises(ConfigError, match="settings: seed"):
+        load_config(None, seed=-3)
+
+
+def test_settings_are_frozen():
+    with pytest.raises(ValidationError):
+        Config().seed = 1  # type: ignore[misc]
+    with pytest.raises(ValidationError):
+        Config().pairs.min_score = 0.3  # type: ignore[misc]
