@@ -18,7 +18,7 @@ _CHUNK = 4096
 _MIN_STEP = 0.02
 """Vertices keep this share of a voxel's edge away from its ends: no triangle shrinks to nothing."""
 _KEY_BITS = 20
-_MIN_PIECE_VOXELS = 100.0
+_MIN_PIECE_VOXELS = 50.0
 _MIN_PIECE_SHARE = 2e-3
 """Pieces with less area than so many squared voxels, or this share of all area, are dropped."""
 
