@@ -48,10 +48,18 @@ def main() -> None:
     parser.add_argument("meshes", nargs="+", type=Path)
     parser.add_argument("--up", default="y", choices=["x", "y", "z"])
     arguments = parser.parse_args()
-    print(
-        "| mesh | gap (deg) | keypoints | repeated | by chance | recall at 8 | by chance | seconds |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
+    columns = [
+        "mesh",
+        "gap (deg)",
+        "keypoints",
+        "repeated",
+        "chance",
+        "recall at 8",
+        "chance",
+        "seconds",
+    ]
+    print("| " + " | ".join(columns) + " |")
+    print("|---" * len(columns) + "|")
     for path in arguments.meshes:
         loaded = trimesh.load_mesh(path, process=False)
         mesh = TriangleMesh(vertices=loaded.vertices, faces=loaded.faces)

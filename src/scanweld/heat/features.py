@@ -32,7 +32,7 @@ class Features:
         points: (K, 3) measured points of the front surface, away from rims.
         normals: (K, 3) unit, smoothed, towards the sensor.
         signatures: (K, T) log of the heat signature over the heat trace.
-        strengths: (K,) how far the log signature rises above its mean over the mesh.
+        strengths: (K,) how far the log signature rises above its median over the front.
         times: (T,) diffusion times in squared diameters.
         found_at: (K, 3) where the maximum was found on the front, before it was moved off a rim.
     """

@@ -20,7 +20,7 @@ class Maxima:
 
     Attributes:
         vertices: (K,) where the shortest of a maximum's times has it.
-        strengths: (K,) excess of the log signature over its mean, averaged over those times.
+        strengths: (K,) excess of the log signature over its median, averaged over those times.
     """
 
     vertices: IntArray
@@ -63,7 +63,7 @@ def persistent_maxima(
         chains += starting
         current = going + starting
     kept = [chain for chain in chains if len(chain.vertices) >= _MIN_TIMES]
-    excess = signature - signature.mean(axis=0)
+    excess = signature - np.median(signature, axis=0)
     return Maxima(
         vertices=np.array([chain.vertices[0] for chain in kept], dtype=np.int64),
         strengths=np.array([_mean_along(excess, chain) for chain in kept], dtype=np.float64),

@@ -6,6 +6,8 @@ from scanweld.geometry.arrays import FloatArray
 
 # Eigenvalues below this, for a mesh of unit size, belong to functions constant on each piece.
 _CONSTANT = 1e-6
+# Less heat than this is none: a piece too small to have a mode would show rounding errors.
+_LEAST_HEAT = 1e-9
 
 
 def diffusion_times(eigenvalues: FloatArray, num_times: int, longest: float) -> FloatArray:
@@ -25,4 +27,4 @@ def heat_signature(eigenvalues: FloatArray, functions: FloatArray, times: FloatA
     varies = eigenvalues > _CONSTANT
     decay = np.exp(-np.outer(eigenvalues[varies], times))
     heat = functions[:, varies] ** 2 @ decay
-    return np.log(np.maximum(heat / decay.sum(axis=0), np.finfo(float).tiny))
+    return np.log(np.maximum(heat / decay.sum(axis=0), _LEAST_HEAT))

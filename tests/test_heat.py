@@ -1,0 +1,336 @@
+"""PA-HKS: the artificial mesh, its Laplacian, the signature and the keypoints."""
+
+import dataclasses
+import logging
+from functools import cache
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.sparse.linalg import ArpackNoConvergence
+from scipy.spatial import KDTree
+
+from scanweld.config import HeatConfig, PrepareConfig
+from scanweld.evaluation.scanner import NoiseModel, scan_mesh
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import random_rotation
+from scanweld.geometry.prepared import PreparedScan, RangeImage
+from scanweld.geometry.scan import RangeScan
+from scanweld.heat import Features, describe, features
+from scanweld.heat.artificial_mesh import ArtificialMesh, close_front
+from scanweld.heat.front import FrontMesh, pieces, thin_front
+from scanweld.heat.keypoints import group, persistent_maxima
+from scanweld.heat.laplacian import eigenpairs
+from scanweld.heat.signature import diffusion_times, heat_signature
+from scanweld.prepare import prepare
+from tests.scenes import MILD_NOISE, small_creature
+
+CONFIG = HeatConfig(max_front_vertices=1000, num_modes=80)
+
+
+def scan_of_creature(
+    azimuth: float,
+    roll: float = 0.0,
+    model: CameraModel = CameraModel.PINHOLE,
+    noise: NoiseModel | None = None,
+    scale: float = 1.0,
+) -> RangeScan:
+    mesh = small_creature()
+    mesh = TriangleMesh(vertices=scale * mesh.vertices, faces=mesh.faces)
+    view = view_of(mesh, azimuth, 10, roll, pixels=160, model=model)
+    return scan_mesh(mesh, view.camera, view.world_from_sensor, noise)
+
+
+@cache
+def prepared(
+    azimuth: float, model: CameraModel = CameraModel.PINHOLE, noise: NoiseModel | None = None
+) -> PreparedScan:
+    return prepare(scan_of_creature(azimuth, model=model, noise=noise), PrepareConfig())
+
+
+@cache
+def described(azimuth: float) -> Features:
+    return describe(prepared(azimuth), CONFIG)
+
+
+def closed(scan: PreparedScan, max_vertices: int) -> tuple[FrontMesh, ArtificialMesh]:
+    front = thin_front(scan.image, max_vertices)
+    return front, close_front(front, scan.image.camera, scan.diameter)
+
+
+def ball(subdivisions: int) -> tuple[FloatArray, IntArray]:
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions)
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def euler(faces: IntArray) -> int:
+    edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    return len(np.unique(faces)) - len(edges) + len(faces)
+
+
+CASES = [
+    (20.0, CameraModel.PINHOLE, None, 1500),
+    (140.0, CameraModel.ORTHOGRAPHIC, None, 900),
+    (260.0, CameraModel.PINHOLE, MILD_NOISE, 3000),
+]
+
+
+@pytest.mark.parametrize(("azimuth", "model", "noise", "max_vertices"), CASES)
+def test_artificial_mesh_is_closed_and_manifold(
+    azimuth: float, model: CameraModel, noise: NoiseModel | None, max_vertices: int
+):
+    """Every directed edge once, its reverse once; one fan of faces around each vertex."""
+    front, mesh = closed(prepared(azimuth, model, noise), max_vertices)
+    start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    span = len(mesh.vertices)
+    forth = np.unique(start * span + end)
+    assert len(forth) == len(start)
+    assert np.array_equal(forth, np.unique(end * span + start))
+    assert np.array_equal(np.unique(mesh.faces), np.arange(span))
+    fans = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_faces
+    assert len(front.points) <= max_vertices
+    assert all(is_one_fan(mesh.faces[fan[fan >= 0]], v) for v, fan in enumerate(fans))
+
+
+def is_one_fan(faces: IntArray, vertex: int) -> bool:
+    """Whether walking from face to face around the vertex passes all its faces."""
+    following = {}
+    for face in faces:
+        at = int(np.flatnonzero(face == vertex)[0])
+        following[face[(at + 1) % 3]] = face[(at + 2) % 3]
+    first = here = next(iter(following))
+    for step in range(1, len(following) + 1):
+        here = following[here]
+        if here == first:
+            return step == len(following)
+    return False
+
+
+@pytest.mark.parametrize(("azimuth", "model", "noise", "max_vertices"), CASES)
+def test_each_closed_piece_is_two_copies_of_its_front(
+    azimuth: float, model: CameraModel, noise: NoiseModel | None, max_vertices: int
+):
+    """Back and walls have the front's holes: the Euler characteristic doubles, piece by piece."""
+    front, mesh = closed(prepared(azimuth, model, noise), max_vertices)
+    piece = pieces(mesh.faces, len(mesh.vertices))
+    front_piece = pieces(front.faces, len(front.points))
+    assert len(np.unique(piece)) == len(np.unique(front_piece)) >= 1
+    for p in np.unique(piece):
+        of_front = front.faces[piece[front.faces[:, 0]] == p]
+        assert euler(mesh.faces[piece[mesh.faces[:, 0]] == p]) == 2 * euler(of_front)
+
+
+def test_front_is_measured_and_walls_run_behind_it():
+    scan = prepared(20.0)
+    front, mesh = closed(scan, 1500)
+    rows, columns = front.pixels.T
+    was_seen = np.isfinite(scan.image.depth[rows, columns])
+    assert was_seen.mean() > 0.95
+    assert np.array_equal(front.points[was_seen], scan.image.points()[rows, columns][was_seen])
+    assert np.array_equal(mesh.vertices[: mesh.num_front], front.points)
+    assert np.array_equal(mesh.faces[: len(front.faces)], front.faces)
+    solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert solid.volume > 0
+    deepest = front.points[:, 2].max() + 0.05 * scan.diameter
+    assert mesh.vertices[:, 2].max() == pytest.approx(deepest)
+    # Walls and back must not take up the spectrum: a full copy would make it four times the front.
+    assert len(mesh.vertices) < 3 * mesh.num_front
+
+
+@pytest.mark.parametrize(("step", "num_pieces"), [(5.0, 1), (8.0, 2)])
+def test_front_is_cut_at_jumps(step: float, num_pieces: int):
+    """A wall before another one, seen straight on; the edge lies between the thinned columns."""
+    camera = Camera(
+        model=CameraModel.ORTHOGRAPHIC, width=60, height=60, fx=1.0, fy=1.0, cx=30.0, cy=30.0
+    )
+    depth = np.full((60, 60), 100.0)
+    depth[:, 31:] += step
+    normals = np.broadcast_to([0.0, 0.0, -1.0], (60, 60, 3))
+    flat = np.zeros((60, 60))
+    image = RangeImage(
+        camera=camera,
+        depth=depth,
+        normals=normals,
+        kind=flat.astype(np.uint8),
+        outside=flat,
+        is_rim=flat > 0,
+        pixel=1.0,
+    )
+    front = thin_front(image, 450)
+    assert len(np.unique(np.diff(np.unique(front.pixels[:, 1])))) == 1
+    assert len(np.unique(pieces(front.faces, len(front.points)))) == num_pieces
+    columns = front.pixels[front.faces][..., 1]
+    crosses = (columns.min(axis=1) <= 30) & (columns.max(axis=1) >= 31)
+    assert crosses.any() == (num_pieces == 1)
+
+
+def test_dropouts_do_not_pierce_the_front():
+    """One lost pixel in fifty leaves the outline of the front as it was."""
+    clean = thin_front(prepared(20.0).image, 1500)
+    image = prepared(20.0).image
+    lost = np.random.default_rng(1).random(image.depth.shape) < 0.02
+    depth = np.where(lost, np.nan, image.depth)
+    dirty = thin_front(dataclasses.replace(image, depth=depth), 1500)
+    assert len(dirty.faces) > 0.9 * len(clean.faces)
+
+
+def test_sphere_has_the_spectrum_of_spherical_harmonics():
+    values, functions = eigenpairs(*ball(4), 25)
+    degree = np.repeat(np.arange(5), 2 * np.arange(5) + 1)
+    assert values == pytest.approx(degree * (degree + 1), rel=0.02, abs=1e-9)
+    # The constant function of unit norm on the area 4 pi.
+    assert functions[:, 0] ** 2 == pytest.approx(np.full(len(functions), 1 / (4 * np.pi)), rel=0.01)
+
+
+def test_open_square_has_the_spectrum_of_cosines():
+    x, y = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41))
+    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(41**2)], axis=1)
+    index = np.arange(41**2).reshape(41, 41)
+    a, b, c, d = (
+        part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    )
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    values, _ = eigenpairs(vertices, faces, 10)
+    waves = np.sort([np.pi**2 * (m * m + n * n) for m in range(5) for n in range(5)])[:10]
+    assert values == pytest.approx(waves, rel=0.02, abs=1e-9)
+
+
+def test_signature_follows_the_eigenpairs_and_not_their_signs():
+    values, functions = eigenpairs(*ball(3), 60)
+    times = diffusion_times(values, 5, 0.5)
+    assert times[0] == pytest.approx(4 / values[-1])
+    assert times[-1] == pytest.approx(0.5)
+    signature = heat_signature(values, functions, times)
+    flips = np.where(np.arange(60) % 2, -1.0, 1.0)
+    assert np.array_equal(signature, heat_signature(values, functions * flips, times))
+    # All points of a sphere are alike, and share the heat trace evenly.
+    assert signature == pytest.approx(np.full(signature.shape, -np.log(4 * np.pi)), abs=0.1)
+
+
+def test_shortest_time_stays_below_the_longest():
+    times = diffusion_times(np.array([0.0, 1.0, 2.0]), 4, 1e-3)
+    assert np.all(np.diff(times) > 0)
+
+
+def test_keypoints_lie_on_the_surface_off_the_rims():
+    scan, found = prepared(20.0), described(20.0)
+    assert len(found.points) >= 10
+    pixels, depth = scan.image.camera.project(found.points)
+    columns, rows = np.rint(pixels).astype(int).T
+    assert depth == pytest.approx(scan.image.depth[rows, columns], rel=1e-12)
+    assert not scan.image.is_rim[rows, columns].any()
+    assert np.array_equal(found.normals, scan.image.normals[rows, columns])
+    rays = scan.image.camera.view_directions(found.points)
+    assert (np.einsum("nk,nk->n", rays, found.normals) < 0).all()
+    assert np.all(np.diff(found.strengths) <= 0)
+    moved = np.linalg.norm(found.points - found.found_at, axis=1) / scan.diameter
+    assert moved.max() < CONFIG.group_diameters
+    assert (moved > 0).any()
+
+
+def test_keypoints_stand_apart():
+    found = described(20.0)
+    gaps = np.linalg.norm(found.points[:, None] - found.points, axis=-1)
+    np.fill_diagonal(gaps, np.inf)
+    unlike = np.sqrt(np.mean((found.signatures[:, None] - found.signatures) ** 2, axis=-1)) >= 0.5
+    assert ((gaps >= CONFIG.group_diameters * prepared(20.0).diameter) | unlike).all()
+
+
+def test_same_scan_gives_same_bytes():
+    again = describe(prepare(scan_of_creature(20.0), PrepareConfig()), CONFIG)
+    for field in dataclasses.fields(again):
+        one, other = getattr(described(20.0), field.name), getattr(again, field.name)
+        assert one.tobytes() == other.tobytes(), field.name
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1024.0])
+def test_scale_changes_nothing_but_the_unit(scale: float):
+    scaled = describe(prepare(scan_of_creature(20.0, scale=scale), PrepareConfig()), CONFIG)
+    plain = described(20.0)
+    assert scaled.points == pytest.approx(scale * plain.points, rel=1e-6)
+    assert scaled.signatures == pytest.approx(plain.signatures, abs=1e-6)
+    assert scaled.times == pytest.approx(plain.times, rel=1e-6)
+
+
+def test_signature_of_a_moved_mesh_is_the_same():
+    _, mesh = closed(prepared(20.0), 800)
+    turn = random_rotation(np.random.default_rng(4))
+    vertices = (mesh.vertices - mesh.vertices.mean(axis=0)) / prepared(20.0).diameter
+    spectra = [eigenpairs(v, mesh.faces, 50) for v in (vertices, vertices @ turn.T + 0.3)]
+    times = diffusion_times(spectra[0][0], 6, 2e-2)
+    one, other = (heat_signature(*spectrum, times) for spectrum in spectra)
+    assert one == pytest.approx(other, abs=1e-4)
+
+
+def test_keypoints_come_back_in_a_rolled_view():
+    """The grid is another one after a roll, the surface is the same."""
+    rolled = prepare(scan_of_creature(20.0, roll=35.0), PrepareConfig())
+    found = describe(rolled, CONFIG).points
+    angle = np.radians(35.0)
+    turn = np.array(
+        [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    near = np.linalg.norm((found @ turn.T)[:, None] - described(20.0).points, axis=-1)
+    other = np.linalg.norm((found @ turn)[:, None] - described(20.0).points, axis=-1)
+    radius = 0.03 * rolled.diameter
+    share = max((d.min(axis=1) < radius).mean() for d in (near, other))
+    assert share > 0.6
+
+
+def test_mirror_halves_have_mirrored_signatures():
+    """The signature of a symmetric body cannot tell left from right, and must not pretend to."""
+    vertices, faces = ball(4)
+    x, y, z = vertices.T
+    body = np.stack([x * (1 + 0.4 * y**2), 0.8 * y, 0.6 * z * (1 + 0.2 * x)], axis=1)
+    values, functions = eigenpairs(body, faces, 40)
+    signature = heat_signature(values, functions, diffusion_times(values, 4, 0.3))
+    _, partner = KDTree(body).query(body * [1, -1, 1])
+    assert signature[partner] == pytest.approx(signature, abs=0.05)
+    assert np.ptp(signature, axis=0).min() > 0.1
+
+
+def test_a_maximum_must_persist():
+    """Two bumps on a strip: one at both times, one at the first only."""
+    points = np.stack([np.arange(20.0), np.zeros(20), np.zeros(20)], axis=1)
+    faces = np.stack([np.arange(18), np.arange(1, 19), np.arange(2, 20)], axis=1)
+    lasting, fleeting = -np.abs(points[:, 0] - 5), -np.abs(points[:, 0] - 14)
+    signature = np.stack([np.maximum(lasting, fleeting), lasting], axis=1)
+    found = persistent_maxima(signature, points, faces, 2.0)
+    assert found.vertices.tolist() == [5]
+    assert persistent_maxima(np.zeros((20, 3)), points, faces, 2.0).vertices.tolist() == []
+
+
+def test_group_keeps_the_strongest_of_like_neighbours():
+    points = np.array([[0.0, 0, 0], [0.5, 0, 0], [0.4, 0, 0], [5.0, 0, 0]])
+    signatures = np.array([[0.0, 0.0], [0.1, 0.0], [3.0, 3.0], [0.0, 0.0]])
+    kept = group(points, signatures, np.array([1.0, 2.0, 0.5, 1.5]), 1.0)
+    assert kept.tolist() == [1, 3, 2]
+
+
+def test_a_scan_too_small_gets_no_keypoints(caplog: pytest.LogCaptureFixture):
+    with caplog.at_level(logging.INFO, logger="scanweld.heat.features"):
+        none = describe(prepared(20.0), HeatConfig(max_front_vertices=200, num_modes=150))
+    assert none.points.shape == (0, 3)
+    assert none.signatures.shape == (0, 10)
+    assert "no heat keypoints" in caplog.text
+
+
+def test_an_unsolved_eigenproblem_gives_no_keypoints(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+):
+    def fail(*_: object) -> None:
+        raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
+
+    monkeypatch.setattr(features, "eigenpairs", fail)
+    with caplog.at_level(logging.WARNING, logger="scanweld.heat.features"):
+        assert len(describe(prepared(20.0), CONFIG).points) == 0
+    assert "not solved" in caplog.text
+
+
+def test_an_image_without_surface_has_an_empty_front():
+    image = prepared(20.0).image
+    nothing = dataclasses.replace(image, depth=np.full(image.depth.shape, np.nan))
+    assert len(thin_front(nothing, 500).faces) == 0
