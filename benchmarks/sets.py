@@ -167,7 +167,12 @@ def make_set(wanted: BenchmarkSet, seed: int, out_dir: Path, data: Path) -> Trut
 
 
 def moved_scans(
-    scans: list[RangeScan], world_from_scan: Mapping[str, Pose], seed: int, *, any_rotation: bool
+    scans: list[RangeScan],
+    world_from_scan: Mapping[str, Pose],
+    seed: int,
+    *,
+    any_rotation: bool,
+    turn_grids: bool = False,
 ) -> tuple[list[RangeScan], dict[str, Pose]]:
     """The scans, each in a random frame, and their reference poses in these frames.
 
@@ -176,6 +181,8 @@ def moved_scans(
         world_from_scan: Reference poses.
         seed: Of the motions.
         any_rotation: Any rotation; else a roll about the viewing axis. Both with a shift.
+        turn_grids: Whether range grids are turned by quarter turns too, so that not even their
+            rows tell what is up.
     """
     rng = np.random.default_rng([seed, 0])
     moved: list[RangeScan] = []
@@ -187,11 +194,12 @@ def moved_scans(
             rotation=random_rotation(rng) if any_rotation else roll,
             translation=rng.uniform(-reach, reach, size=3),
         )
+        quarters = int(rng.integers(4)) if turn_grids else 0
         moved.append(
             RangeScan(
                 name=scan.name,
                 points=motion.apply(scan.points),
-                grid=scan.grid,
+                grid=None if scan.grid is None else np.rot90(scan.grid, quarters),
                 colors=scan.colors,
                 confidence=scan.confidence,
             )
