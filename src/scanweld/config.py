@@ -101,9 +101,9 @@ class GraphConfig(Section):
 class ContoursConfig(Section):
     """MM-ICC (paper 3.2)."""
 
-    jump_pixels: float = Field(default=8.0, gt=1)
+    jump_pixels: float = Field(default=5.0, gt=1)
     """Thresholds tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
-    trim: float = Field(default=0.7, gt=0, le=1)
+    trim: float = Field(default=0.85, gt=0, le=1)
     """Share of the contour matches that trimmed ICP keeps."""
     num_renders: int = Field(default=20, ge=1)
     """Outer iterations: predicted range images are rendered anew in each."""
@@ -121,7 +121,7 @@ class RefineConfig(Section):
     """Rounds of matching and solving."""
     match_diameters: tuple[float, float] = (0.02, 0.006)
     """Farthest match, in the first and in the last round."""
-    contour_weight: float = Field(default=1.0, ge=0)
+    contour_weight: float = Field(default=0.3, ge=0)
     """Weight of the contour term beside the surface term; 0 leaves it out."""
 
 

@@ -58,9 +58,11 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
     """Which vertices (V,) lie on an edge that only one face has."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    keys, counts = np.unique(edges[:, 0] * num_vertices + edges[:, 1], return_counts=True)
+    once = keys[counts == 1]
     is_border = np.zeros(num_vertices, dtype=bool)
-    is_border[unique[counts == 1].ravel()] = True
+    is_border[once // num_vertices] = True
+    is_border[once % num_vertices] = True
     return is_border
 
 

@@ -22,8 +22,12 @@ MIN_MATCHES = 20
 """A direction of a pair with fewer matches than this has no say."""
 TUKEY = 4.685
 """Residuals above this many robust standard deviations have no weight."""
-NOISE_FLOOR = 1e-7
-"""Least spread of residuals, in diameters: exact data have none."""
+SURFACE_NOISE_DIAMETERS = 1e-7
+"""Least spread of surface residuals: exact data have none."""
+NUM_CONTOUR_ROUNDS = 4
+"""Contours are matched in the last rounds: they are sharp where poses are nearly right, and dear."""
+OUTLINE_NOISE_PIXELS = 0.3
+"""Least spread of contour residuals: an outline is known to the pixel, no better."""
 DAMPING = 1e-7
 """Added to the diagonal, relative to its mean: what no match holds stays where it is."""
 
@@ -100,19 +104,22 @@ def refine_poses(
     poses = dict(sorted(world_from_sensor.items()))
     sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
     diameter = float(np.median([scans[k].diameter for k in poses]))
+    pixel = float(np.median([scans[k].image.pixel for k in poses]))
+    noise = SURFACE_NOISE_DIAMETERS * diameter, OUTLINE_NOISE_PIXELS * pixel
+    first_contour_round = config.num_rounds - (NUM_CONTOUR_ROUNDS if config.contour_weight else 0)
     views = sorted({(min(pair), max(pair)) for pair in pairs if set(pair) <= set(poses)})
     step = 0.0
-    for radius in np.geomspace(*config.match_diameters, config.num_rounds):
+    for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
         surface = _match_surfaces(sources, poses, float(radius) * diameter)
         contour: list[_Found] = []
-        if contour_matches is not None and config.contour_weight > 0:
+        if contour_matches is not None and n >= first_contour_round:
             contour = _match_contours(poses, views, contour_matches)
-        terms = _weighted(surface, contour, poses, config.contour_weight, diameter)
+        terms = _weighted(surface, contour, poses, config.contour_weight, noise)
         poses, moved = _solve(terms, poses, diameter)
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
     surface = _match_surfaces(sources, poses, config.match_diameters[1] * diameter)
-    terms = _weighted(surface, [], poses, 0.0, diameter)
+    terms = _weighted(surface, [], poses, 0.0, noise)
     rms = _rms(terms)
     logger.info("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
     return Refinement(poses=poses, pairs=_residuals(terms), rms=rms, step=step)
@@ -148,23 +155,22 @@ def _weighted(
     contour: Sequence[_Found],
     poses: Mapping[int, Pose],
     contour_weight: float,
-    diameter: float,
+    noise: tuple[float, float],
 ) -> list[_Term]:
-    """Terms in the world; each kind is measured by its own spread."""
-    floor = NOISE_FLOOR * diameter
-    surface_spread, contour_spread = _spread(surface, floor), _spread(contour, floor)
+    """Terms in the world; each kind is measured by its own spread, at least its noise."""
+    surface_spread, contour_spread = _spread(surface, noise[0]), _spread(contour, noise[1])
     share = contour_weight * (surface_spread / contour_spread) ** 2 if surface else 1.0
     return [_term(*match, poses, surface_spread, 1.0) for match in surface] + [
         _term(*match, poses, contour_spread, share) for match in contour
     ]
 
 
-def _spread(found: Sequence[_Found], floor: float) -> float:
+def _spread(found: Sequence[_Found], noise: float) -> float:
     """Robust standard deviation of all residuals, by their median."""
     if not found:
-        return floor
+        return noise
     residuals = np.concatenate([matches.residuals for _, _, matches in found])
-    return max(1.4826 * float(np.median(np.abs(residuals))), floor)
+    return max(1.4826 * float(np.median(np.abs(residuals))), noise)
 
 
 def _term(
