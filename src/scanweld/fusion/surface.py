@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
-from scanweld.fusion.volume import BLOCK, Volume, VoxelArray
+from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume, VoxelArray
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import compact, face_normals
 
@@ -17,7 +17,6 @@ _CHUNK = 4096
 """Blocks that are looked at together; bounds the memory."""
 _MIN_STEP = 0.02
 """Vertices keep this share of a voxel's edge away from its ends: no triangle shrinks to nothing."""
-_KEY_BITS = 20
 _MIN_PIECE_VOXELS = 50.0
 _MIN_PIECE_SHARE = 2e-3
 """Pieces with less area than so many squared voxels, or this share of all area, are dropped."""
@@ -64,7 +63,7 @@ def _cell_edges(
     ends = edge_corners()[edge]
     block, voxel = volume.blocks[index[cell[:, 0]]], cell[:, 1:]
     base = (BLOCK * block + voxel)[row] + offsets[ends[:, 0]]
-    keys = (base[:, 0] << _KEY_BITS | base[:, 1]) << _KEY_BITS | base[:, 2]
+    keys = (base[:, 0] << KEY_BITS | base[:, 1]) << KEY_BITS | base[:, 2]
     values = corners[:, is_crossed].T
     return 3 * keys + edge // 4, values[row[:, None], ends].astype(np.float64)
 
@@ -84,8 +83,8 @@ def _with_neighbours(volume: Volume, distance: VoxelArray, index: IntArray) -> V
 def _vertices(volume: Volume, keys: IntArray, values: FloatArray) -> FloatArray:
     """Where the distance is zero on edges, by linear interpolation."""
     axis, corner = keys % 3, keys // 3
-    mask = (1 << _KEY_BITS) - 1
-    base = np.stack([corner >> 2 * _KEY_BITS, corner >> _KEY_BITS & mask, corner & mask], axis=1)
+    mask = (1 << KEY_BITS) - 1
+    base = np.stack([corner >> 2 * KEY_BITS, corner >> KEY_BITS & mask, corner & mask], axis=1)
     step = np.clip(values[:, 0] / (values[:, 0] - values[:, 1]), _MIN_STEP, 1 - _MIN_STEP)
     return volume.origin + volume.voxel * (base + step[:, None] * np.eye(3)[axis])
 

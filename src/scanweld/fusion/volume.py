@@ -4,7 +4,6 @@ After Curless and Levoy, A volumetric method for building complex models from ra
 distances are taken to the tangent plane of the pixel, carving only takes support away.
 """
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,16 +11,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.errors import InputError
 from scanweld.fusion.posed_image import PosedImage
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-
-logger = logging.getLogger(__name__)
 
 VoxelArray = NDArray[np.float32]
 
 BLOCK = 8
 """Voxels along the edge of a block."""
-_KEY_BITS = 20
+KEY_BITS = 20
+"""Voxel and block coordinates are below 2^20, so that three of them fit into one number."""
 _CARVE_RATIO = 1.0
 """A voxel is empty where free space weighs more than this share of its surface's weight."""
 _DEPTH_VOXELS = 2.0
@@ -77,6 +76,9 @@ def integrate(images: Sequence[PosedImage], voxel: float, truncation: float) -> 
         images: At least one; one of them with at least one surface pixel.
         voxel: Edge of a voxel, in the scans' unit.
         truncation: Likewise; twice the voxel or more.
+
+    Raises:
+        InputError: If the scans are spread over more than a million voxels.
     """
     volume = _allocate(images, voxel, truncation)
     for image in images:
@@ -96,7 +98,6 @@ def integrate(images: Sequence[PosedImage], voxel: float, truncation: float) -> 
             image.carving,
             image.is_rim,
         )
-    logger.debug("%d blocks of %.3g voxels", len(volume.blocks), voxel)
     return volume
 
 
@@ -104,9 +105,12 @@ def _allocate(images: Sequence[PosedImage], voxel: float, truncation: float) -> 
     surfaces = [image.points[image.weight > 0] for image in images]
     low = np.min([points.min(axis=0) for points in surfaces if len(points)], axis=0)
     origin = low - truncation - voxel
+    high = np.max([points.max(axis=0) for points in surfaces if len(points)], axis=0)
+    if float((high - low).max()) / voxel > 0.9 * 2**KEY_BITS:
+        raise InputError("the posed scans lie too far apart to be fused; see their poses")
     keys = np.unique(np.concatenate([_near(p - origin, voxel, truncation) for p in surfaces]))
-    mask = (1 << _KEY_BITS) - 1
-    blocks = np.stack([keys >> (2 * _KEY_BITS), (keys >> _KEY_BITS) & mask, keys & mask], axis=-1)
+    mask = (1 << KEY_BITS) - 1
+    blocks = np.stack([keys >> (2 * KEY_BITS), (keys >> KEY_BITS) & mask, keys & mask], axis=-1)
     shape = (len(keys), BLOCK, BLOCK, BLOCK)
     return Volume(
         origin=origin,
@@ -131,7 +135,7 @@ def _near(points: FloatArray, voxel: float, truncation: float) -> IntArray:
 
 def _keys(blocks: IntArray) -> IntArray:
     x, y, z = blocks[..., 0], blocks[..., 1], blocks[..., 2]
-    return (((x << _KEY_BITS) | y) << _KEY_BITS) | z
+    return (((x << KEY_BITS) | y) << KEY_BITS) | z
 
 
 @njit(cache=True, nogil=True)
