@@ -183,7 +183,7 @@ def _suspects(problem: _Problem, assembly: _Assembly) -> list[tuple[int, int, in
     touched = {scan for edge in shut_out for scan in edge}
     suspects = [s for s in assembly.used if s.i in touched or s.j in touched]
     suspects.sort(key=lambda s: s.score)
-    return [(min(s.i, s.j), max(s.i, s.j), s.rank) for s in suspects[:MAX_SUSPECTS]]
+    return [support.alternative for support in suspects[:MAX_SUSPECTS]]
 
 
 def _graph(problem: _Problem, assembly: _Assembly) -> ViewGraph:

@@ -1,7 +1,7 @@
 """Ways to lay one component of placed scans onto another, and what all their scans say of it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,11 @@ class Support:
     agree: float
     is_good: bool
 
+    @property
+    def alternative(self) -> tuple[int, int, int]:
+        """The alternative it stands for: its pair (i, j), i < j, and its rank."""
+        return min(self.i, self.j), max(self.i, self.j), self.rank
+
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Merge:
@@ -86,7 +91,9 @@ def propose_merges(
     judge: Judge,
     banned: frozenset[tuple[int, int, int]] = frozenset(),
 ) -> list[Merge]:
-    """Distinct ways to merge two components, best first, each with its margin over the next.
+    """Distinct ways to merge two components, best first, each with its margin over its rivals.
+
+    What may not propose is a rival still: taking a pair back does not make another one surer.
 
     Args:
         a: First component.
@@ -97,27 +104,31 @@ def propose_merges(
         judge: Gives the evidence on any pair at any pose.
         banned: Alternatives (i, j, rank), i < j, that may not propose.
     """
-    proposals = _proposals(a, b, pairs, banned)
+    proposals = _proposals(a, b, pairs)
     middle = np.mean([b[j].apply(centres[j]) for j in sorted(b)], axis=0)
     clusters = _cluster(proposals, middle, near)[:MAX_JUDGED]
     merges = [_judged(a, b, motion, supports, judge) for motion, supports in clusters]
     merges.sort(key=lambda merge: -merge.score)
-    return [_with_margin(merge, merges) for merge in merges]
+    allowed = [
+        replace(
+            merge,
+            supports=tuple(s for s in merge.supports if s.alternative not in banned),
+            margin=_margin(merge, merges),
+        )
+        for merge in merges
+    ]
+    return [merge for merge in allowed if merge.supports]
 
 
 def _proposals(
-    a: Poses,
-    b: Poses,
-    pairs: Mapping[tuple[int, int], PairResult],
-    banned: frozenset[tuple[int, int, int]],
+    a: Poses, b: Poses, pairs: Mapping[tuple[int, int], PairResult]
 ) -> list[tuple[Pose, Support]]:
     found = []
     for i in sorted(a):
         for j in sorted(b):
             result = pairs.get((min(i, j), max(i, j)))
             for rank, option in enumerate(result.alternatives if result else ()):
-                is_banned = (min(i, j), max(i, j), rank) in banned
-                if is_banned or option.score < MIN_CANDIDATE_SCORE:
+                if option.score < MIN_CANDIDATE_SCORE:
                     continue
                 i_from_j = option.i_from_j if i < j else option.i_from_j.inverse()
                 is_good = rank == 0 and result is not None and result.kind is PairKind.GOOD
@@ -172,19 +183,8 @@ def _judged(
     )
 
 
-def _with_margin(merge: Merge, merges: Sequence[Merge]) -> Merge:
-    rivals = [other.score for other in merges if other is not merge]
-    margin = 1.0
+def _margin(merge: Merge, merges: Sequence[Merge]) -> float:
     if merge.score <= 0:
-        margin = 0.0
-    elif rivals:
-        margin = min(1.0, (merge.score - max(rivals)) / merge.score)
-    return Merge(
-        a_from_b=merge.a_from_b,
-        supports=merge.supports,
-        agree=merge.agree,
-        violated=merge.violated,
-        free=merge.free,
-        worst=merge.worst,
-        margin=margin,
-    )
+        return 0.0
+    rivals = [other.score for other in merges if other is not merge]
+    return min(1.0, (merge.score - max(rivals)) / merge.score) if rivals else 1.0

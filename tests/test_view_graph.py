@@ -1,0 +1,497 @@
+"""The view graph on drawn graphs: which pairs hold, which scans are placed, and what is said.
+
+The judge knows where the scans truly are. A pair that is fooled fools the judge too, as in life:
+both look at the same two scans. What a wrong pose of one pair implies for other pairs, they deny.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scanweld.config import GraphConfig
+from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.multiview.assemble import build_view_graph
+from scanweld.multiview.merge import Judge
+from scanweld.multiview.view_graph import Component, Edge, ViewGraph
+from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult
+
+CENTRE = np.array([0.0, 0.0, 3.0])
+SAME_DEG, SAME_SHIFT = 2.5, 0.03
+GOOD, WEAK = 0.4, 0.09
+DENIED = Evidence(agree=0.1, front=0.2, contradict=0.0, free=0.1, occluded=0.5, unknown=0.1)
+Pairs = dict[Edge, PairResult]
+
+
+def world_of(num_scans: int, seed: int = 0) -> list[Pose]:
+    """world_from_sensor of scans of an object of diameter 1, seen from anywhere."""
+    rng = np.random.default_rng(seed)
+    rotations = [random_rotation(rng) for _ in range(num_scans)]
+    shifts = rng.uniform(-0.3, 0.3, size=(num_scans, 3))
+    return [
+        Pose(rotation=r, translation=t - r @ CENTRE) for r, t in zip(rotations, shifts, strict=True)
+    ]
+
+
+def seen(agree: float) -> Evidence:
+    """Evidence without a violation; the rest is out of sight."""
+    return Evidence(
+        agree=agree, front=0.0, contradict=0.0, free=0.0, occluded=1.0 - agree, unknown=0.0
+    )
+
+
+def option(i_from_j: Pose, agree: float = GOOD) -> Alternative:
+    return Alternative(i_from_j=i_from_j, evidence=seen(agree), overlap=agree)
+
+
+def pair_of(i: int, j: int, kind: PairKind, *options: Alternative) -> PairResult:
+    return PairResult(
+        i=i,
+        j=j,
+        kind=kind,
+        reason="" if kind is PairKind.GOOD else f"{kind} by itself",
+        alternatives=options,
+        information=np.eye(6),
+        observability=1.0,
+        margin=1.0,
+        rms=0.0,
+    )
+
+
+def true_pose(world: Sequence[Pose], i: int, j: int) -> Pose:
+    return world[i].inverse() @ world[j]
+
+
+def exact_pair(
+    i: int, j: int, world: Sequence[Pose], agree: float = GOOD, kind: PairKind = PairKind.GOOD
+) -> PairResult:
+    return pair_of(i, j, kind, option(true_pose(world, i, j), agree))
+
+
+def exact_pairs(
+    edges: Iterable[Edge], world: Sequence[Pose], agree: Mapping[Edge, float] | None = None
+) -> Pairs:
+    """Good pairs along the edges; between all other scans nothing fits."""
+    n, drawn = len(world), set(edges)
+    pairs = {}
+    for i in range(n):
+        for j in range(i + 1, n):
+            if (i, j) in drawn:
+                pairs[i, j] = exact_pair(i, j, world, (agree or {}).get((i, j), GOOD))
+            else:
+                pairs[i, j] = pair_of(i, j, PairKind.NO_OVERLAP)
+    return pairs
+
+
+def turn_about_centre(degrees: float, axis: Sequence[float] = (0.6, 0.0, 0.8)) -> Pose:
+    turn = Pose.exp([*(np.radians(degrees) * np.array(axis)), 0, 0, 0])
+    return Pose(rotation=turn.rotation, translation=CENTRE - turn.rotation @ CENTRE)
+
+
+def turned(pair: PairResult, degrees: float) -> PairResult:
+    """The same pair, as sure of itself as before, with a pose that is off by an angle."""
+    best = pair.alternatives[0]
+    wrong = replace(best, i_from_j=best.i_from_j @ turn_about_centre(degrees))
+    return replace(pair, alternatives=(wrong, *pair.alternatives[1:]))
+
+
+def is_same(p: Pose, q: Pose) -> bool:
+    apart = p.inverse() @ q
+    return apart.angle_deg() < SAME_DEG and apart.shift_at(CENTRE) < SAME_SHIFT
+
+
+def judge_of(world: Sequence[Pose], pairs: Pairs, denied: Evidence = DENIED) -> Judge:
+    """Believes what the pairs believe, and the truth; denies everything else."""
+
+    def judge(i: int, j: int, i_from_j: Pose) -> Evidence:
+        if i > j:
+            return judge(j, i, i_from_j.inverse())
+        for known in pairs[i, j].alternatives:
+            if is_same(known.i_from_j, i_from_j):
+                return known.evidence
+        return seen(0.0) if is_same(true_pose(world, i, j), i_from_j) else denied
+
+    return judge
+
+
+def stay(poses: Mapping[int, Pose]) -> Mapping[int, Pose]:
+    return poses
+
+
+def graph_of(
+    world: Sequence[Pose],
+    pairs: Pairs,
+    judge: Judge | None = None,
+    settle: Callable[[Mapping[int, Pose]], Mapping[int, Pose]] = stay,
+) -> ViewGraph:
+    judge = judge or judge_of(world, pairs)
+    centres = [CENTRE] * len(world)
+    graph = build_view_graph(len(world), pairs, centres, 1.0, judge, settle, GraphConfig())
+    assert_sound(graph, len(world), pairs)
+    return graph
+
+
+def assert_sound(graph: ViewGraph, num_scans: int, pairs: Pairs) -> None:
+    """What holds of every view graph: all is accounted for, once, and with a reason."""
+    placed = [k for c in graph.components for k in c.poses]
+    assert sorted([*placed, *graph.unplaced]) == list(range(num_scans))
+    assert set(graph.accepted) | set(graph.rejected) == set(pairs)
+    assert not set(graph.accepted) & set(graph.rejected)
+    assert all(graph.rejected.values()) and all(graph.unplaced.values())
+    sizes = [len(c.poses) for c in graph.components]
+    assert sizes == sorted(sizes, reverse=True) and min(sizes, default=2) >= 2
+    for component in graph.components:
+        assert component.poses[component.reference].angle_deg() == 0.0
+
+
+def scans_of(component: Component) -> set[int]:
+    return set(component.poses)
+
+
+def assert_right(component: Component, world: Sequence[Pose]) -> None:
+    """All relative poses within a component are true."""
+    for k, pose in component.poses.items():
+        off = true_pose(world, component.reference, k).inverse() @ pose
+        assert off.angle_deg() < 1e-6 and off.shift_at(CENTRE) < 1e-9
+
+
+def only_component(graph: ViewGraph, world: Sequence[Pose]) -> Component:
+    (component,) = graph.components
+    assert_right(component, world)
+    return component
+
+
+DIAGONAL = [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3), (2, 4), (3, 4)]
+
+
+@pytest.mark.parametrize("agree", [0.2, 0.4, 0.6])
+def test_bad_diagonal_is_found(agree: float):
+    """Both triangles through 2-3 disagree, the loop 1-2-4-3 around it closes: only 2-3 is wrong.
+
+    0 --- 1 --- 3
+     \\   /   /  |
+      \\ / /     |
+       2 ------ 4
+
+    Also where the bad one is the strongest, and is merged first.
+    """
+    world = world_of(5)
+    pairs = exact_pairs(DIAGONAL, world, {(2, 3): agree})
+    pairs[2, 3] = turned(pairs[2, 3], degrees=15)
+    graph = graph_of(world, pairs)
+    assert scans_of(only_component(graph, world)) == {0, 1, 2, 3, 4}
+    assert set(graph.accepted) == set(DIAGONAL) - {(2, 3)}
+    assert graph.rejected[2, 3].startswith("cycle: 15.0 deg off")
+    assert set(graph.doubts) == {2, 3}
+
+
+def test_a_good_graph_is_accepted_whole():
+    world = world_of(5)
+    graph = graph_of(world, exact_pairs(DIAGONAL, world))
+    only_component(graph, world)
+    assert set(graph.accepted) == set(DIAGONAL)
+    assert not graph.unplaced and not graph.doubts
+
+
+RING = [(0, 1), (1, 2), (2, 3), (0, 3)]
+
+
+def test_a_ring_without_chords_closes():
+    """0 - 1 - 2 - 3 - 0: no triangles; opposite scans share nothing and deny nothing."""
+    world = world_of(4)
+    graph = graph_of(world, exact_pairs(RING, world))
+    only_component(graph, world)
+    assert set(graph.accepted) == set(RING)
+    assert not graph.doubts
+
+
+@pytest.mark.parametrize("bad", RING)
+@pytest.mark.parametrize("agree", [0.3, 0.5])
+def test_a_ring_that_does_not_close_loses_the_pair_that_the_others_deny(bad: Edge, agree: float):
+    """One of the four is 20 deg off: what it implies, the opposite scans deny."""
+    world = world_of(4)
+    pairs = exact_pairs(RING, world, {bad: agree})
+    pairs[bad] = turned(pairs[bad], degrees=20)
+    graph = graph_of(world, pairs)
+    only_component(graph, world)
+    assert set(graph.accepted) == set(RING) - {bad}
+    assert graph.rejected[bad].startswith("cycle")
+
+
+def lone_triangle(world: Sequence[Pose], weakest: float) -> ViewGraph:
+    """0-1 and 1-2 are stronger than 0-2, which does not fit; nobody knows which one is wrong."""
+    pairs = exact_pairs([(0, 1), (1, 2), (0, 2)], world, {(0, 1): 0.5, (0, 2): weakest})
+    pairs[0, 2] = turned(pairs[0, 2], degrees=15)
+    return graph_of(world, pairs, judge_of(world, pairs, denied=seen(0.0)))
+
+
+@pytest.mark.parametrize("weakest", [0.1, 0.2, 0.3])
+def test_of_a_lone_triangle_that_does_not_close_the_weakest_goes(weakest: float):
+    """The clearly weakest goes, and the report says that it disagreed."""
+    world = world_of(3)
+    graph = lone_triangle(world, weakest)
+    assert scans_of(only_component(graph, world)) == {0, 1, 2}
+    assert set(graph.accepted) == {(0, 1), (1, 2)}
+    assert graph.rejected[0, 2].startswith("cycle: 15.0 deg")
+    assert set(graph.doubts) == {0, 2}
+
+
+@pytest.mark.parametrize("weakest", [0.35, 0.39])
+def test_of_a_lone_triangle_too_close_to_call_only_the_strongest_pair_is_placed(weakest: float):
+    """Rather than guess between 1-2 and 0-2, or drop 0-1 to make room for both, 2 stays out."""
+    world = world_of(3)
+    graph = lone_triangle(world, weakest)
+    assert scans_of(only_component(graph, world)) == {0, 1}
+    assert "contradicts other scans" in graph.unplaced[2]
+
+
+def test_two_components():
+    """0-1-2 and 3-4-5: nothing joins them, nothing is invented."""
+    world = world_of(6)
+    edges = [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5)]
+    graph = graph_of(world, exact_pairs(edges, world))
+    assert [scans_of(c) for c in graph.components] == [{0, 1, 2}, {3, 4, 5}]
+    for component in graph.components:
+        assert_right(component, world)
+    assert not graph.unplaced and set(graph.accepted) == set(edges)
+
+
+def test_a_wrong_bridge_does_not_join_two_components():
+    """0-1-2 ~ 3-4-5: the bridge 2-3 is sure of itself, but all other pairs across deny it."""
+    world = world_of(6)
+    edges = [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5)]
+    pairs = exact_pairs([*edges, (2, 3)], world, {(2, 3): 0.3})
+    pairs[2, 3] = turned(pairs[2, 3], degrees=60)
+    graph = graph_of(world, pairs)
+    assert [scans_of(c) for c in graph.components] == [{0, 1, 2}, {3, 4, 5}]
+    for component in graph.components:
+        assert_right(component, world)
+    assert "contradictions" in graph.rejected[2, 3]
+
+
+def ambiguous(pair: PairResult, rival: float, degrees: float = 90) -> PairResult:
+    """The pair with a wrong pose before the true one."""
+    wrong = option(pair.alternatives[0].i_from_j @ turn_about_centre(degrees), rival)
+    options = sorted((wrong, *pair.alternatives), key=lambda option: -option.score)
+    reason = "another pose explains the scans as well"
+    return replace(
+        pair, kind=PairKind.AMBIGUOUS, reason=reason, alternatives=tuple(options), margin=0.05
+    )
+
+
+@pytest.mark.parametrize("third", [PairKind.GOOD, PairKind.NO_OVERLAP])
+def test_a_third_scan_resolves_an_ambiguous_pair(third: PairKind):
+    """0-1 could be either of two poses; 1-2 is good, and 0-2, even if weak, knows which."""
+    world = world_of(3)
+    pairs = exact_pairs([(0, 1), (1, 2)], world)
+    pairs[0, 1] = ambiguous(pairs[0, 1], rival=0.42)
+    pairs[0, 2] = exact_pair(0, 2, world, GOOD if third is PairKind.GOOD else WEAK, third)
+    graph = graph_of(world, pairs)
+    assert scans_of(only_component(graph, world)) == {0, 1, 2}
+    assert graph.accepted[0, 1] is pairs[0, 1].alternatives[1]
+    assert not graph.doubts
+
+
+def test_an_ambiguous_pair_alone_stays_ambiguous():
+    world = world_of(2)
+    pairs = exact_pairs([(0, 1)], world)
+    pairs[0, 1] = ambiguous(pairs[0, 1], rival=0.42)
+    graph = graph_of(world, pairs)
+    assert not graph.components
+    assert "another pose explains" in graph.unplaced[0]
+
+
+def test_an_ambiguous_pair_is_not_resolved_by_a_scan_that_has_no_say():
+    """1-2 is good, but 2 knows nothing of 0: 0 stays out rather than be guessed."""
+    world = world_of(3)
+    pairs = exact_pairs([(0, 1), (1, 2)], world)
+    pairs[0, 1] = ambiguous(pairs[0, 1], rival=0.38)
+    graph = graph_of(world, pairs, judge_of(world, pairs, denied=seen(0.0)))
+    assert scans_of(only_component(graph, world)) == {1, 2}
+    assert "another pose explains" in graph.unplaced[0]
+
+
+def test_a_good_pair_may_be_right_only_in_its_second_pose():
+    """2-3 prefers a wrong pose, but kept the true one: the others pick it."""
+    world = world_of(5)
+    pairs = exact_pairs(DIAGONAL, world)
+    pairs[2, 3] = replace(ambiguous(pairs[2, 3], rival=0.55), kind=PairKind.GOOD)
+    graph = graph_of(world, pairs)
+    only_component(graph, world)
+    assert set(graph.accepted) == set(DIAGONAL)
+    assert graph.accepted[2, 3] is pairs[2, 3].alternatives[1]
+
+
+def weak_bridges(world: Sequence[Pose], bridges: Iterable[Edge]) -> Pairs:
+    """0-1 and 2-3 are good, the bridges true but weak."""
+    pairs = exact_pairs([(0, 1), (2, 3)], world)
+    for i, j in bridges:
+        pairs[i, j] = exact_pair(i, j, world, WEAK, PairKind.NO_OVERLAP)
+    return pairs
+
+
+def test_weak_pairs_that_agree_join_two_components():
+    """0 = 1 and 2 = 3 are good, 0 - 2 and 1 - 3 weak, but found separately they say the same."""
+    world = world_of(4)
+    graph = graph_of(world, weak_bridges(world, [(0, 2), (1, 3)]))
+    assert scans_of(only_component(graph, world)) == {0, 1, 2, 3}
+    assert {(0, 2), (1, 3)} <= set(graph.accepted)
+
+
+def test_one_weak_pair_alone_joins_nothing():
+    world = world_of(4)
+    graph = graph_of(world, weak_bridges(world, [(0, 2)]))
+    assert [scans_of(c) for c in graph.components] == [{0, 1}, {2, 3}]
+    assert graph.rejected[0, 2] == "no overlap by itself"
+
+
+def test_weak_pairs_that_disagree_join_nothing():
+    world = world_of(4)
+    pairs = weak_bridges(world, [(0, 2), (1, 3)])
+    pairs[1, 3] = turned(pairs[1, 3], degrees=30)
+    graph = graph_of(world, pairs)
+    assert [scans_of(c) for c in graph.components] == [{0, 1}, {2, 3}]
+
+
+@pytest.mark.parametrize("agree", [0.15, 0.45])
+def test_a_scan_of_something_else_stays_out(agree: float):
+    """3 takes itself for a neighbour of 2, but 0 and 1 see through it; nobody else knows it."""
+    world = world_of(4)
+    pairs = exact_pairs([(0, 1), (1, 2), (0, 2), (2, 3)], world, {(2, 3): agree})
+    pairs[2, 3] = turned(pairs[2, 3], degrees=70)
+    graph = graph_of(world, pairs)
+    assert scans_of(only_component(graph, world)) == {0, 1, 2}
+    assert set(graph.unplaced) == {3}
+    assert f"score {agree:.2f}" in graph.unplaced[3]
+    assert "contradicts other scans" in graph.unplaced[3]
+
+
+def test_a_scan_without_any_pose_stays_out():
+    world = world_of(3)
+    graph = graph_of(world, exact_pairs([(0, 1)], world))
+    assert scans_of(only_component(graph, world)) == {0, 1}
+    assert graph.unplaced == {2: "no pose brings it onto any other scan"}
+
+
+def test_nothing_is_placed_where_nothing_fits():
+    world = world_of(4)
+    graph = graph_of(world, exact_pairs([], world))
+    assert not graph.components and set(graph.unplaced) == {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize("centre", range(5))
+def test_the_reference_is_the_best_supported_scan(centre: int):
+    r"""All pairs meet in one scan.
+
+    a   b
+     \ /
+      c
+     / \
+    d   e
+    """
+    world = world_of(5)
+    star = [(min(centre, k), max(centre, k)) for k in range(5) if k != centre]
+    graph = graph_of(world, exact_pairs(star, world))
+    assert only_component(graph, world).reference == centre
+    assert graph.neighbours(centre) == tuple(k for k in range(5) if k != centre)
+
+
+def test_settling_keeps_a_long_chain_from_drifting():
+    """Each pair of a ring of 12 is 1.5 deg off, all the same way; the ring still closes."""
+    world = world_of(12)
+    ring = [(k, k + 1) for k in range(11)] + [(0, 11)]
+    pairs = {edge: turned(pair, 1.5) if pair.alternatives else pair
+             for edge, pair in exact_pairs(ring, world).items()}  # fmt: skip
+
+    def settle(poses: Mapping[int, Pose]) -> Mapping[int, Pose]:
+        first = min(poses)
+        return {k: poses[first] @ true_pose(world, first, k) for k in poses}
+
+    graph = graph_of(world, pairs, settle=settle)
+    assert len(only_component(graph, world).poses) == 12
+    assert set(graph.accepted) == set(ring)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn graph: which pairs are good, how strong, and which of them are fooled."""
+
+    num_scans: int
+    strengths: dict[Edge, float]
+    fooled: dict[Edge, float]
+
+    def pairs(self, world: Sequence[Pose]) -> Pairs:
+        pairs = exact_pairs(self.strengths, world, self.strengths)
+        return pairs | {edge: turned(pairs[edge], d) for edge, d in self.fooled.items()}
+
+
+@st.composite
+def drawings(draw: st.DrawFn) -> Drawing:
+    """Up to 7 scans; some good pairs, each of its own strength, a few of which are fooled."""
+    n = draw(st.integers(2, 7))
+    every = [(i, j) for i in range(n) for j in range(i + 1, n)]
+    edges = draw(st.lists(st.sampled_from(every), unique=True, max_size=12))
+    ranks = draw(st.permutations(range(len(edges))))
+    fooled = draw(st.lists(st.sampled_from(edges), unique=True, max_size=3)) if edges else []
+    return Drawing(
+        num_scans=n,
+        strengths={edge: 0.2 + 0.03 * rank for edge, rank in zip(edges, ranks, strict=True)},
+        fooled={edge: draw(st.sampled_from([15.0, 60.0, 150.0])) for edge in fooled},
+    )
+
+
+@settings(max_examples=40)
+@given(drawings())
+def test_nothing_wrong_is_asserted_where_a_third_scan_can_tell(drawing: Drawing):
+    """Only a fooled pair without a third scan can be placed wrongly."""
+    world = world_of(drawing.num_scans)
+    graph = graph_of(world, drawing.pairs(world))
+    for component in graph.components:
+        if len(component.poses) > 2 or tuple(sorted(component.poses)) not in drawing.fooled:
+            assert_right(component, world)
+    for edge in graph.accepted:
+        assert edge in drawing.strengths
+
+
+@given(drawings().filter(lambda drawing: not drawing.fooled))
+def test_without_a_fooled_pair_components_are_those_of_the_drawing(drawing: Drawing):
+    world = world_of(drawing.num_scans)
+    graph = graph_of(world, drawing.pairs(world))
+    assert set(graph.accepted) == set(drawing.strengths)
+    home = {k: n for n, c in enumerate(graph.components) for k in c.poses}
+    for i, j in drawing.strengths:
+        assert home[i] == home[j]
+
+
+@settings(max_examples=30)
+@given(drawings(), st.integers(0, 10**6))
+def test_permuting_the_scans_permutes_the_outcome(drawing: Drawing, seed: int):
+    world = world_of(drawing.num_scans)
+    pairs = drawing.pairs(world)
+    new = np.random.default_rng(seed).permutation(drawing.num_scans).tolist()
+    old = {k: n for n, k in enumerate(new)}
+    shuffled = {}
+    for (i, j), pair in pairs.items():
+        if new[i] < new[j]:
+            shuffled[new[i], new[j]] = replace(pair, i=new[i], j=new[j])
+        else:
+            options = tuple(replace(o, i_from_j=o.i_from_j.inverse()) for o in pair.alternatives)
+            shuffled[new[j], new[i]] = replace(pair, i=new[j], j=new[i], alternatives=options)
+    a = graph_of(world, pairs)
+    b = graph_of([world[old[k]] for k in range(len(world))], dict(sorted(shuffled.items())))
+    assert {tuple(sorted((new[i], new[j]))) for i, j in a.accepted} == set(b.accepted)
+    assert {new[k] for k in a.unplaced} == set(b.unplaced)
+    assert {new[k] for k in a.doubts} == set(b.doubts)
+    sets = [{new[k] for k in c.poses} for c in a.components]
+    assert sorted(map(sorted, sets)) == sorted(sorted(c.poses) for c in b.components)
+    for c in a.components:
+        d = next(d for d in b.components if new[c.reference] in d.poses)
+        assert len(c.poses) == 2 or d.reference == new[c.reference]
+        for i in c.poses:
+            for j in c.poses:
+                in_a = c.poses[i].inverse() @ c.poses[j]
+                in_b = d.poses[new[i]].inverse() @ d.poses[new[j]]
+                np.testing.assert_allclose(in_a.matrix(), in_b.matrix(), atol=1e-9)
