@@ -22,5 +22,5 @@ def show_pairs(scans: Sequence[scanweld.RangeScan]) -> None:
 
 if __name__ == "__main__":
     with TemporaryDirectory() as folder:
-        simulate(creature(voxels=70), Path(folder) / "scans", num_scans=6, pixels=140)
+        simulate(creature(voxels=70), Path(folder) / "scans", num_scans=5, pixels=140)
         show_pairs(scanweld.read_scans(Path(folder) / "scans"))

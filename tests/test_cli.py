@@ -1,6 +1,7 @@
 """The command line as users meet it: exit codes, streams, and what is left on disk."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -205,6 +206,15 @@ def test_same_stem_twice_gives_relative_paths(scans: Path):
         shutil.move(scans / f"{'a' if name == 'left' else 'b'}.ply", scans / name / "s.ply")
     assert scanweld("run", scans / "left", scans / "right", "-o", "model") == 0
     assert list(json.loads(Path("model/poses.json").read_text())["scans"]) == ["left/s", "right/s"]
+
+
+def test_file_names_that_are_no_utf8_are_spelled_out(scans: Path):
+    shutil.move(scans / "a.ply", os.fsdecode(os.fsencode(scans) + b"/\xff.ply"))
+    Path(os.fsdecode(os.fsencode(scans) + b"/\xfe.ply")).write_text("broken")
+    assert scanweld("run", scans, "-o", "model") == 3
+    poses = json.loads(Path("model/poses.json").read_text())
+    assert list(poses["scans"]) == ["\\xff", "b", "c"]
+    assert "\\xfe.ply: not a PLY" in poses["unplaced"]["\\xfe"]
 
 
 def test_force_replaces_and_its_absence_refuses(scans: Path):

@@ -9,7 +9,7 @@ from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import ScanFile, collect, read_scan
+from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.progress import Progress, silent
 from scanweld.reconstruction import Reconstruction
 
@@ -65,6 +65,6 @@ def read_all(
         try:
             scans.append(read_scan(file.path, file.name))
         except ReadError as error:
-            unreadable[file.name] = str(error)
+            unreadable[file.name] = printable(str(error))
     progress("read", len(files), len(files))
     return scans, unreadable

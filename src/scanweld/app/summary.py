@@ -9,7 +9,6 @@ from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 def summary(result: Reconstruction, output: Path) -> str:
     """Verdict in a sentence, what could not be placed and why, and where the files are."""
     lines = [f"{result.verdict.value}: {sentence(result)}"]
-    lines += [f"  {reason}" for reason in result.reasons]
     lines += [f"  unplaced {name}: {reason}" for name, reason in _in_order(dict(result.unplaced))]
     doubtful = {
         name: scan.reason
@@ -19,6 +18,8 @@ def summary(result: Reconstruction, output: Path) -> str:
     lines += [f"  doubtful {name}: {reason}" for name, reason in _in_order(doubtful)]
     if len(result.components) > 1:
         lines += [f"  component {k + 1}: {', '.join(c)}" for k, c in enumerate(result.components)]
+    if result.poses and result.mesh is None:
+        lines.append("  no model: the placed scans could not be fused")
     lines.append(f"  {output}: {', '.join(_files(result))}")
     return "\n".join(lines)
 

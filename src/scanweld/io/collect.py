@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from scanweld.errors import InputError, ReadError
-from scanweld.io.names import natural_key
+from scanweld.io.names import natural_key, printable
 from scanweld.io.read import READERS
 
 logger = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ def collect(inputs: Sequence[Path | str]) -> tuple[ScanFile, ...]:
     found = {Path(os.path.abspath(path)): path for each in inputs for path in _expand(each)}
     absolute = sorted(found, key=lambda path: natural_key(path.as_posix()))
     return tuple(
-        ScanFile(path=found[path], name=name)
+        ScanFile(path=found[path], name=printable(name))
         for path, name in zip(absolute, _unique_names(absolute), strict=True)
     )
 
