@@ -1,8 +1,6 @@
 """scanweld: unordered range scans of an object to one registered, fused model and a verdict.
 
-    scans = scanweld.read_scans("scans/")
-    result = scanweld.run(scans)
-    print(result.verdict, result.poses)
+In short: ``scanweld.run(scanweld.read_scans("scans/"))``.
 """
 
 from scanweld.config import Config, load_config
