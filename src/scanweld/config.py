@@ -103,8 +103,8 @@ class ContoursConfig(Section):
 
     jump_pixels: float = Field(default=5.0, gt=1)
     """Thresholds tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
-    trim: float = Field(default=0.85, gt=0, le=1)
-    """Share of the contour matches that trimmed ICP keeps."""
+    trim: float | None = Field(default=None, gt=0, le=1)
+    """Share of the contour matches that trimmed ICP keeps; found anew in each step if None."""
     num_renders: int = Field(default=20, ge=1)
     """Outer iterations: predicted range images are rendered anew in each."""
     num_steps: int = Field(default=3, ge=1)

@@ -20,6 +20,10 @@ from scanweld.geometry.prepared import PreparedScan
 
 MIN_MATCHES = 12
 """Fewer contour matches than this say nothing about a pose."""
+FRACTION_EXPONENT = 1.3
+"""How much a larger share of matches is worth, against a smaller rms."""
+MIN_SHARE = 0.3
+"""Smallest share of the matches that is kept."""
 FIRST_MATCH_PIXELS = 16.0
 """Farthest match in the first of the rounds across the outline; it shrinks from there."""
 NUM_OUTLINE_ROUNDS = 10
@@ -105,6 +109,8 @@ def trimmed_icp(
 ) -> tuple[Pose, FloatArray]:
     """Trimmed ICP (Chetverikov et al. 2002) of contour points in 3D, both directions at once.
 
+    The share kept is given, or found in each step (fractional ICP, Phillips et al. 2007).
+
     Args:
         pairs: Contours of i predicted in camera j, and of j predicted in camera i.
         j_from_i: The pose at which they were predicted.
@@ -123,23 +129,34 @@ def trimmed_icp(
     seen_by_i, seen_by_j = KDTree(back.observed.points), KDTree(forth.observed.points)
     pose, squares = j_from_i, np.zeros(0)
     for _ in range(config.num_steps):
-        here, there, near = _trimmed(seen_by_j, pose.apply(of_i), config.trim)
-        here2, there2, near2 = _trimmed(seen_by_i, pose.inverse().apply(of_j), config.trim)
+        p, q, forth_squares = _trimmed(seen_by_j, pose.apply(of_i), config.trim)
+        r, s, back_squares = _trimmed(seen_by_i, pose.inverse().apply(of_j), config.trim)
         pose = rigid_fit(
-            np.concatenate([of_i[here], back.observed.points[there2]]),
-            np.concatenate([forth.observed.points[there], of_j[here2]]),
+            np.concatenate([of_i[p], back.observed.points[s]]),
+            np.concatenate([forth.observed.points[q], of_j[r]]),
         )
-        squares = np.concatenate([near, near2])
+        squares = np.concatenate([forth_squares, back_squares])
     return pose, squares
 
 
 def _trimmed(
-    observed: KDTree, predicted: FloatArray, share: float
+    observed: KDTree, predicted: FloatArray, share: float | None
 ) -> tuple[IntArray, IntArray, FloatArray]:
     """The closest matches: indices of predicted and observed points, squared distances."""
     distances, nearest = observed.query(predicted)
-    kept = np.argsort(distances, kind="stable")[: int(np.ceil(share * len(distances)))]
-    return kept, np.asarray(nearest)[kept], distances[kept] ** 2
+    order = np.argsort(distances, kind="stable")
+    squares = distances[order] ** 2
+    num = _best_count(squares) if share is None else int(np.ceil(share * len(order)))
+    return order[:num], np.asarray(nearest)[order[:num]], squares[:num]
+
+
+def _best_count(squares: FloatArray) -> int:
+    """How many of the smallest squares to keep: least rms / share^lambda (Phillips et al. 2007)."""
+    counts = np.arange(1, len(squares) + 1)
+    shares = counts / len(squares)
+    fractional = np.sqrt(np.cumsum(squares) / counts) / shares**FRACTION_EXPONENT
+    least = int(np.ceil(MIN_SHARE * len(squares)))
+    return least + int(np.argmin(fractional[least - 1 :]))
 
 
 def rigid_fit(moving: FloatArray, target: FloatArray) -> Pose:
