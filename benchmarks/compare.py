@@ -11,7 +11,7 @@ from typing import Any
 
 METRICS = (
     *("right", "wrong", "rotation_mean", "rotation_max"),
-    *("translation_mean", "translation_max", "seconds", "peak_mb"),
+    *("translation_mean", "translation_max", "seconds", "cpu_seconds", "peak_mb"),
 )
 
 
@@ -25,7 +25,7 @@ def main() -> int:
     print("|" + "---|" * (len(METRICS) + 2))
     for name in dict.fromkeys(name for name, _ in a):
         both = [key for key in a if key[0] == name and key in b]
-        cells = [_difference([(a[key][m], b[key][m]) for key in both]) for m in METRICS]
+        cells = [_difference([(a[key].get(m), b[key].get(m)) for key in both]) for m in METRICS]
         print(f"| {name} | {len(both)} | " + " | ".join(cells) + " |")
     return 0
 

@@ -4,7 +4,7 @@
 
 Every seed gives the files another order, neutral names and random frames. The table shows, over the
 seeds: the fewest right, the most wrong, medians of the mean errors, the largest of the maximum
-errors, median wall time and largest peak memory; beside each number its floor, and FAIL where it is
+errors, median times and largest peak memory; beside each number its floor, and FAIL where it is
 missed.
 """
 
@@ -31,6 +31,7 @@ COLUMNS = (
     ("translation_mean", "translation mean (%)", median, 3),
     ("translation_max", "translation max (%)", max, 3),
     ("seconds", "wall (s)", median, 1),
+    ("cpu_seconds", "CPU (s)", median, 1),
     ("peak_mb", "peak (MB)", max, 0),
 )
 """Key of a run and of the floors, heading, how seeds are put together, digits."""
@@ -63,7 +64,7 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> dict[str, Any]
         environment = dict(os.environ)
         if options.cold:
             environment["NUMBA_CACHE_DIR"] = str(Path(temporary) / "compiled")
-        exit_code, seconds, peak_mb = timed(command, environment)
+        usage = timed(command, environment)
         found, report = _outcome(out)
         if options.keep:
             _keep(out, options.keep / f"{name}-{seed}")
@@ -71,28 +72,30 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> dict[str, Any]
     return {
         "set": name,
         "seed": seed,
-        "exit_code": exit_code,
         "verdict": report.get("verdict", "error"),
-        "seconds": seconds,
-        "peak_mb": peak_mb,
+        **usage,
         "stages": report.get("stages", {}),
         **summary(errors),
         "scans": _by_original(errors, truth),
     }
 
 
-def timed(command: list[str], environment: dict[str, str]) -> tuple[int, float, float]:
-    """Exit code, wall seconds, and peak resident megabytes of a command."""
+def timed(command: list[str], environment: dict[str, str]) -> dict[str, float]:
+    """Exit code, wall and CPU seconds, and peak resident megabytes of a command."""
     start = time.perf_counter()
-    # stdin closed, output passed through to stderr: stdout is the table's.
+    # Its output goes to stderr: stdout is the table's.
     process = subprocess.Popen(
         command, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno()
     )
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
-    seconds = time.perf_counter() - start
     in_kilobytes = 1024.0 if platform.system() == "Darwin" else 1.0
-    return process.returncode, seconds, usage.ru_maxrss / in_kilobytes / 1024.0
+    return {
+        "exit_code": process.returncode,
+        "seconds": time.perf_counter() - start,
+        "cpu_seconds": usage.ru_utime + usage.ru_stime,
+        "peak_mb": usage.ru_maxrss / in_kilobytes / 1024.0,
+    }
 
 
 def summary(errors: PoseErrors) -> dict[str, Any]:
@@ -129,7 +132,7 @@ def _row(runs: list[dict[str, Any]], floors: Floors) -> tuple[list[str], bool]:
     ]
     for key, _, together, digits in COLUMNS:
         values = [run[key] for run in runs if run[key] is not None]
-        floor = getattr(floors, key)
+        floor = getattr(floors, key, None)
         if not values:
             judged.append(_judged("-", floor is None))
             continue

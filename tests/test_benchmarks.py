@@ -42,6 +42,7 @@ def a_run(seed: int, **changes: Any) -> dict[str, Any]:
         "translation_mean": 0.1,
         "translation_max": 0.2,
         "seconds": 10.0,
+        "cpu_seconds": 15.0,
         "peak_mb": 500.0,
     }
     return {**run, **changes}
