@@ -162,6 +162,24 @@ def test_bad_input_keeps_what_an_earlier_run_finished(output: Path):
         assert workspace.cache.get("ab") == 1
 
 
+def test_failure_to_open_keeps_what_an_earlier_run_finished(
+    output: Path, monkeypatch: pytest.MonkeyPatch
+):
+    with pytest.raises(KeyboardInterrupt), Workspace(output) as workspace:
+        workspace.cache.put("ab", 1)
+        raise KeyboardInterrupt
+
+    def is_full(self: Path, *_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as context:
+        context.setattr(Path, "mkdir", is_full)
+        with pytest.raises(WriteError, match="No space left"):
+            Workspace(output).__enter__()
+    with Workspace(output) as workspace:
+        assert workspace.cache.get("ab") == 1
+
+
 def test_second_run_on_the_same_output_is_refused(output: Path):
     with Workspace(output) as first:
         with pytest.raises(WriteError, match=r"another run.*process \d+"), Workspace(output):

@@ -53,7 +53,7 @@ class Workspace:
             self._open()
             self._check_free()
         except OSError as error:
-            self._discard()
+            self._leave(keep=not self._is_new())
             raise WriteError(
                 f"{self.output}: cannot be written ({error.strerror}); choose another output"
             ) from error
@@ -71,12 +71,8 @@ class Workspace:
         self._put_back()
         # An output that could not be written is worth another try; bad input is not.
         is_refused = isinstance(error, ScanweldError) and not isinstance(error, WriteError)
-        is_new = self.folder in self._made
-        if self._published or (is_refused and is_new) or self.cache.is_empty():
-            self._discard()
-        else:
-            self._clear(self.staging)
-            self._unlock()
+        is_spent = self._published or (is_refused and self._is_new())
+        self._leave(keep=not (is_spent or self.cache.is_empty()))
 
     def publish(self) -> None:
         """Move the finished folder to the output's place, and an old one out of it first.
@@ -132,10 +128,13 @@ class Workspace:
         if self._old.exists() and not _is_filled(self.output):
             self._old.rename(self.output)
 
-    def _discard(self) -> None:
-        """Remove the workspace, and folders that were made for it and are empty."""
+    def _is_new(self) -> bool:
+        return self.folder in self._made
+
+    def _leave(self, *, keep: bool) -> None:
+        """Remove the workspace or what is half done in it, and folders made that are empty."""
         if self._lock is not None:
-            self._clear(self.folder)
+            self._clear(self.staging if keep else self.folder)
         self._unlock()
         for folder in reversed(self._made):
             if folder.is_dir() and not any(folder.iterdir()):
