@@ -211,5 +211,6 @@ def _in_view(scan: RangeScan, camera: Camera) -> BoolArray:
     rays = camera.unproject_image(np.ones((camera.height, camera.width)))
     pixels, _ = scan.camera.project(rays)
     u, v = pixels[..., 0], pixels[..., 1]
-    inside_u = (u >= -0.5) & (u <= scan.camera.width - 0.5)
-    return inside_u & (v >= -0.5) & (v <= scan.camera.height - 0.5)
+    # Up to the outermost pixels' centres, as the surface: no gap opens between it and the border.
+    inside_u = (u >= -1e-6) & (u <= scan.camera.width - 1 + 1e-6)
+    return inside_u & (v >= -1e-6) & (v <= scan.camera.height - 1 + 1e-6)

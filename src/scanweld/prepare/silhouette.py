@@ -13,7 +13,8 @@ def classify_pixels(
     """Kinds of the pixels, and how far the free ones lie from the closed silhouette.
 
     Only pixels outside the closed and filled silhouette are free: gaps in it may be dropouts or
-    shadows as well as air. Where the silhouette leaves the field of view, nothing is free.
+    shadows as well as air. Nothing is free beyond the field of view, nor in gaps that its border
+    cuts off.
 
     Args:
         is_surface: (H, W) pixels with a depth; the border, as wide as the closing, is empty.
@@ -24,13 +25,21 @@ def classify_pixels(
         Kinds (H, W) and distances (H, W) in pixels, 0 inside the silhouette.
     """
     silhouette = close(is_surface, closing_pixels)
-    filled = np.asarray(ndimage.binary_fill_holes(silhouette | ~in_view), dtype=np.bool_)
-    silhouette = filled & (silhouette | in_view)
+    is_free = _surroundings(in_view & ~silhouette, in_view)
     kind = np.full(is_surface.shape, PixelKind.UNKNOWN, dtype=np.uint8)
-    kind[~silhouette & in_view] = PixelKind.FREE
+    kind[is_free] = PixelKind.FREE
     kind[is_surface] = PixelKind.SURFACE
-    outside = distance_to(silhouette)
-    return kind, np.where(kind == PixelKind.FREE, outside, 0.0)
+    outside = distance_to(silhouette | (in_view & ~is_free))
+    return kind, np.where(is_free, outside, 0.0)
+
+
+def _surroundings(empty: BoolArray, in_view: BoolArray) -> BoolArray:
+    """Of the connected empty regions (H, W), the one with most of the field of view's border."""
+    region = np.zeros(empty.shape, dtype=np.int64)
+    ndimage.label(empty, output=region)
+    border = empty & ~np.asarray(ndimage.binary_erosion(in_view), dtype=np.bool_)
+    length = np.bincount(region[border])
+    return region == np.argmax(length) if border.any() else np.zeros_like(empty)
 
 
 def close(mask: BoolArray, radius: float) -> BoolArray:
