@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,16 @@ def test_order_of_the_records_does_not_change_the_bytes(tmp_path: Path, result: 
 def test_folder_that_is_not_there_is_an_error(tmp_path: Path, result: Reconstruction):
     with pytest.raises(WriteError, match="cannot be written"):
         write_outputs(result, tmp_path / "missing")
+
+
+def test_every_key_and_the_score_are_explained(result: Reconstruction):
+    text = (Path(__file__).parents[1] / "docs/report.md").read_text(encoding="utf-8")
+    report, pair = report_json(result), graph_json(result)["pairs"][0]
+    for key in {*report, *report["scans"]["a"], *pair, *pair["evidence"]} - {"format", "i", "j"}:
+        assert f"`{key}`" in text or key in ("scans", "stages"), key
+    formula = re.search(r"\*\*Score\*\*: `([^`]*)`", text)
+    assert formula is not None
+    assert eval(formula[1], dataclasses.asdict(EVIDENCE)) == pytest.approx(EVIDENCE.score)
 
 
 def test_json_text_is_readable_and_exact():
