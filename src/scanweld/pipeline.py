@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from scanweld.config import Config
+from scanweld.contours.coherence import contour_matcher
 from scanweld.errors import InputError
 from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
@@ -171,11 +172,12 @@ def _refine(
 ) -> ViewGraph:
     """Refine each component's poses together (paper 3.2); the evidence must not suffer."""
     judge_pair = make_judge(fields, intake.diameter, config)
+    contours = contour_matcher(intake.prepared, config.contours)
 
     def refine(component: Component) -> Component:
         edges = [edge for edge in graph.accepted if edge[0] in component.poses]
         start = dict(component.poses)
-        refined = dict(refine_poses(intake.prepared, start, edges, config.refine).poses)
+        refined = dict(refine_poses(intake.prepared, start, edges, config.refine, contours).poses)
         if _support(refined, edges, judge_pair) < _support(start, edges, judge_pair) - 0.01:
             logger.warning("the joint refinement made the evidence worse and is left out")
             return component

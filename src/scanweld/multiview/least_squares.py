@@ -71,7 +71,7 @@ def weighted_terms(
 
 
 def move_poses(
-    terms: Sequence[Term], poses: Mapping[int, Pose], arm: float
+    terms: Sequence[Term], poses: Mapping[int, Pose], arm: float, max_step: float
 ) -> tuple[dict[int, Pose], float]:
     """One Gauss-Newton step of all poses but the first.
 
@@ -79,6 +79,7 @@ def move_poses(
         terms: What holds the scans together.
         poses: ``world_from_sensor``.
         arm: The length at which a turn counts like a shift.
+        max_step: A scan moves no farther than this.
 
     Returns:
         The poses, and the largest movement of a scan as a length.
@@ -89,6 +90,8 @@ def move_poses(
     normal, gradient = _normal_equations(terms, list(poses), centre, arm)
     twists = np.zeros((len(poses), 6))
     twists[1:] = -np.linalg.solve(normal[6:, 6:], gradient[6:]).reshape(-1, 6)
+    lengths = np.linalg.norm(twists, axis=1, keepdims=True)
+    twists *= max_step / np.maximum(lengths, max_step)
     moved = {
         k: _moved(poses[k], twist, centre, arm) for k, twist in zip(poses, twists, strict=True)
     }

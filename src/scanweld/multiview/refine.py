@@ -25,6 +25,8 @@ SURFACE_NOISE_DIAMETERS = 1e-7
 """Least spread of surface residuals: exact data have none."""
 OUTLINE_NOISE_PIXELS = 0.3
 """Least spread of contour residuals: an outline is known to the pixel, no better."""
+MAX_STEP_DIAMETERS = 0.1
+"""A scan moves no farther in a round: matches say nothing about longer steps."""
 NUM_CONTOUR_ROUNDS = 4
 """Contours take part in the last rounds: they cost most, and are sharp at nearly right poses."""
 
@@ -75,13 +77,14 @@ def refine_poses(
     """Refine all poses together by surface and contour matches.
 
     Surfaces are matched between all scans that overlap at the current poses, point to plane and
-    in both directions, within a radius that shrinks from round to round; contours between the
-    given pairs. The first scan stays where it is.
+    in both directions, within a radius that shrinks from round to round. Contours are matched in
+    the last rounds, between those of the given pairs whose surfaces touch: alone they hold a
+    pair too weakly. The first scan stays where it is.
 
     Args:
         scans: All scans.
         world_from_sensor: Start poses of those to refine, by index in ``scans``.
-        pairs: Adjacent views; where contours are matched.
+        pairs: Adjacent views, whose contours are matched.
         config: Rounds, radii and the weight of the contours.
         contour_matches: Finds contour matches; without it there is no contour term.
     """
@@ -93,15 +96,16 @@ def refine_poses(
     pixel = float(np.median([scans[k].image.pixel for k in poses]))
     noise = SURFACE_NOISE_DIAMETERS * diameter, OUTLINE_NOISE_PIXELS * pixel
     contour_rounds = NUM_CONTOUR_ROUNDS if config.contour_weight > 0 else 0
-    views = sorted({(min(pair), max(pair)) for pair in pairs if set(pair) <= set(poses)})
+    views = {(min(pair), max(pair)) for pair in pairs}
     step = 0.0
     for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
         surface = _match_surfaces(sources, poses, float(radius) * diameter)
         contour: list[Found] = []
         if contour_matches is not None and n >= config.num_rounds - contour_rounds:
-            contour = _match_contours(poses, views, contour_matches)
+            touching = {(min(i, j), max(i, j)) for i, j, _ in surface}
+            contour = _match_contours(poses, sorted(touching & views), contour_matches)
         terms = weighted_terms(surface, contour, poses, config.contour_weight, noise)
-        poses, moved = move_poses(terms, poses, diameter / 3)
+        poses, moved = move_poses(terms, poses, diameter / 3, MAX_STEP_DIAMETERS * diameter)
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
     surface = _match_surfaces(sources, poses, config.match_diameters[1] * diameter)
