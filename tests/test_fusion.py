@@ -93,6 +93,15 @@ def test_same_bytes_twice():
     assert first.faces.tobytes() == second.faces.tobytes()
 
 
+def test_blocks_without_a_surface_change_nothing(monkeypatch: pytest.MonkeyPatch):
+    """Taken a block at a time, many of the blocks hold nothing to draw."""
+    expected = fuse(*sphere_scans(), CONFIG)
+    monkeypatch.setattr("scanweld.fusion.surface._CHUNK", 1)
+    mesh = fuse(*sphere_scans(), CONFIG)
+    assert mesh.vertices.tobytes() == expected.vertices.tobytes()
+    assert mesh.faces.tobytes() == expected.faces.tobytes()
+
+
 @pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
 def test_unit_does_not_matter(factor: float):
     """Powers of two scale without rounding, so every decision must fall the same way."""

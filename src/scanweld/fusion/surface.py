@@ -57,7 +57,7 @@ def _cell_edges(
     case = np.packbits(corners < 0, axis=0, bitorder="little")[0]
     is_crossed = (case > 0) & (case < 255) & np.isfinite(corners).all(axis=0)
     cell = np.argwhere(is_crossed)
-    edges = triangle_table()[case[is_crossed]].reshape(len(cell), -1)
+    edges = triangle_table().reshape(256, -1)[case[is_crossed]]
     row, column = np.nonzero(edges >= 0)
     edge = edges[row, column]
     ends = edge_corners()[edge]
