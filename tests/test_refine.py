@@ -61,7 +61,7 @@ def errors(
     off = [truth[k].inverse() @ poses[k] for k in truth if k]
     middles = [scans[k].mesh.vertices.mean(axis=0) for k in truth if k]
     shifts = [pose.shift_at(middle) for pose, middle in zip(off, middles, strict=True)]
-    return float(np.mean([p.angle_deg() for p in off])), np.mean(shifts) / scans[0].diameter
+    return float(np.mean([p.angle_deg() for p in off])), float(np.mean(shifts)) / scans[0].diameter
 
 
 def assert_same(a: Refinement, b: Refinement, size: float) -> None:

@@ -1,0 +1,299 @@
+"""Contour sets, the three prunings and MM-ICC, on spheres of known outline and rendered scans."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+import trimesh
+
+from scanweld.config import ContoursConfig, PrepareConfig
+from scanweld.contours.coherence import (
+    ContourPair,
+    coherence,
+    contour_matcher,
+    contour_pair,
+    outline_matches,
+)
+from scanweld.contours.contour_sets import (
+    ContourPoints,
+    ObservedContours,
+    far_side,
+    near_side,
+    observe_contours,
+)
+from scanweld.contours.mm_icc import refine_pair, rigid_fit, trimmed_icp
+from scanweld.contours.predict import predict_contours
+from scanweld.contours.prune import (
+    prune_invisible_observed,
+    prune_invisible_predicted,
+    prune_self_occlusion,
+)
+from scanweld.evaluation.scanner import scan_mesh
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.camera import CameraModel
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
+from scanweld.prepare import prepare
+from tests.prepared import PreparedPair, creature_pair
+
+MODELS = [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC]
+RADIUS = 50.0
+CONFIG = ContoursConfig()
+
+
+def ball(radius: float = RADIUS, centre: tuple[float, float, float] = (0, 0, 0)) -> TriangleMesh:
+    solid = trimesh.creation.icosphere(subdivisions=5, radius=radius)
+    return TriangleMesh(vertices=solid.vertices + np.array(centre), faces=solid.faces)
+
+
+@lru_cache
+def seen_ball(azimuth_deg: float, model: CameraModel) -> tuple[ObservedContours, Pose]:
+    """Contours of a ball seen from an azimuth, and ``world_from_sensor``."""
+    view = view_of(ball(), azimuth_deg, pixels=120, model=model)
+    scan = prepare(scan_mesh(ball(), view.camera, view.world_from_sensor), PrepareConfig())
+    return observe_contours(scan, CONFIG), view.world_from_sensor
+
+
+def balls(gap_deg: float, model: CameraModel) -> tuple[ObservedContours, ObservedContours, Pose]:
+    (i, world_from_i), (j, world_from_j) = seen_ball(0.0, model), seen_ball(gap_deg, model)
+    return i, j, world_from_j.inverse() @ world_from_i
+
+
+def distance_from_outline(j: ObservedContours, world_from_j: Pose, contour: ContourPoints):
+    """Pixels from the ball's outline in camera j: a circle (nearly, for a pinhole far away)."""
+    camera = j.scan.image.camera
+    middle = world_from_j.inverse().translation[None]
+    centre, depth = camera.project(middle)
+    reach = float(np.linalg.norm(middle))
+    if camera.model is CameraModel.PINHOLE:
+        radius = camera.fx * RADIUS / np.sqrt(reach**2 - RADIUS**2)
+    else:
+        radius = camera.fx * RADIUS
+    assert depth > 0
+    return np.linalg.norm(contour.pixels - centre, axis=1) - radius
+
+
+def nudged(pair: PreparedPair, degrees: float, seed: int = 3) -> Pose:
+    axis = np.random.default_rng(seed).normal(size=3)
+    rotation = rotation_exp(np.radians(degrees) * axis / np.linalg.norm(axis))
+    middle = pair.i_from_j.apply(pair.fields[1].centre)
+    turn = Pose(rotation=rotation, translation=middle - rotation @ middle)
+    return turn @ pair.i_from_j
+
+
+def test_near_and_far_side_of_a_step():
+    """Two levels 10 apart, beside free pixels on the left and unknown ones on the right."""
+    depth = np.full((5, 10), np.nan)
+    depth[:, 2:5], depth[:, 5:8] = 20.0, 10.0
+    is_free = np.zeros(depth.shape, dtype=bool)
+    is_free[:, :2] = True
+    near, far = near_side(depth, is_free, 4.0), far_side(depth, 4.0)
+    assert np.flatnonzero(near.all(axis=0)).tolist() == [2, 5]
+    assert np.flatnonzero(near.any(axis=0)).tolist() == [2, 5]
+    assert np.flatnonzero(far.all(axis=0)).tolist() == [4]
+    assert np.flatnonzero(far.any(axis=0)).tolist() == [4]
+
+
+def test_small_steps_are_no_contours():
+    depth = 10.0 + np.arange(8.0)[None, :].repeat(6, axis=0)
+    nowhere = np.zeros(depth.shape, dtype=bool)
+    assert not near_side(depth, nowhere, 1.5).any()
+    assert not far_side(depth, 1.5).any()
+    assert near_side(depth, nowhere, 0.5).sum() == 6 * 7
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_contour_of_a_ball_is_its_outline(model: CameraModel):
+    i, world_from_i = seen_ball(0.0, model)
+    off = distance_from_outline(i, world_from_i, i.contour)
+    assert len(i.contour) > 200
+    assert np.abs(off).max() < 3.5
+    assert i.is_border.sum() >= len(i.contour)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_first_pruning_leaves_the_outline(model: CameraModel):
+    """From the side, half of the half ball's contour is its cut; that goes, the outline stays."""
+    i, j, j_from_i = balls(90.0, model)
+    predicted, corners = predict_contours(i, j, j_from_i)
+    kept = prune_self_occlusion(corners, i.is_border)
+    off = distance_from_outline(j, seen_ball(90.0, model)[1], predicted)
+    assert (off < -10).sum() > 50
+    assert np.abs(off[kept]).max() < 2.5
+    assert kept.sum() > 0.8 * (np.abs(off) < 1.5).sum()
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_second_pruning_keeps_the_side_that_looks_at_the_other_camera(model: CameraModel):
+    i, j, j_from_i = balls(90.0, model)
+    kept = prune_invisible_observed(j.contour, i.scan.image.camera, j_from_i)
+    towards_i = -j_from_i.rotation[:, 2]
+    middle = seen_ball(90.0, model)[1].inverse().translation
+    side = (j.contour.points - middle) @ towards_i / RADIUS
+    assert side[kept].min() > -0.1
+    assert side[~kept].max() < (0.1 if model is CameraModel.ORTHOGRAPHIC else 0.4)
+    assert 0.3 < kept.mean() < 0.6
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_third_pruning_drops_the_inside_of_the_shell(model: CameraModel):
+    """From behind, camera j looks into the half ball: what it sees there is not the object."""
+    i, j, j_from_i = balls(150.0, model)
+    predicted, corners = predict_contours(i, j, j_from_i)
+    kept = prune_invisible_predicted(predicted, j.scan.image.camera)
+    outward = predicted.points - seen_ball(150.0, model)[1].inverse().translation
+    rays = j.scan.image.camera.view_directions(predicted.points)
+    looks_away = np.einsum("nk,nk->n", outward, rays) / RADIUS
+    assert (~kept).sum() > 50
+    assert looks_away[kept].max() < 0.2
+    assert looks_away[~kept].min() > -0.2
+    assert len(corners) == len(predicted)
+
+
+@pytest.mark.parametrize("gap", [60, 90])
+def test_pruned_contours_lie_in_the_observing_camera(gap: int):
+    """Predicted and observed contours of the truth cohere; with the frames mixed up they do not."""
+    pair = creature_pair(gap)
+    i, j = (observe_contours(scan, CONFIG) for scan in pair.scans)
+    j_from_i = pair.i_from_j.inverse()
+    pairs = contour_pair(i, j, j_from_i), contour_pair(j, i, pair.i_from_j)
+    assert min(len(part.predicted) for part in pairs) > 50
+    assert coherence(pairs) > 0.6
+    assert coherence([contour_pair(i, j, pair.i_from_j)]) < 0.3
+
+
+def test_front_ball_hides_the_rear_one():
+    """The near side of the step is the front ball's outline, the far side is just beyond it."""
+    front, rear = ball(30.0, (80.0, 0.0, 0.0)), ball(60.0, (-40.0, 30.0, 0.0))
+    both = TriangleMesh(
+        vertices=np.concatenate([front.vertices, rear.vertices]),
+        faces=np.concatenate([front.faces, rear.faces + len(front.vertices)]),
+    )
+    view = view_of(both, 0.0, pixels=150, model=CameraModel.ORTHOGRAPHIC)
+    scan = prepare(scan_mesh(both, view.camera, view.world_from_sensor), PrepareConfig())
+    seen = observe_contours(scan, CONFIG)
+    hidden_edge = far_side(scan.image.depth, seen.jump)
+    world = view.world_from_sensor.apply(scan.image.points()[hidden_edge])
+    on_rear = np.abs(np.linalg.norm(world - [-40.0, 30.0, 0.0], axis=1) - 60.0) < 1.0
+    assert on_rear.sum() > 30
+    assert np.abs(np.linalg.norm(world[on_rear][:, 1:], axis=1) - 30.0).max() < 4.0
+    outline = view.world_from_sensor.apply(seen.contour.points)
+    on_front = np.abs(np.linalg.norm(outline - [80.0, 0.0, 0.0], axis=1) - 30.0) < 1.0
+    across = np.linalg.norm(outline[on_front][:, 1:], axis=1)
+    assert np.ptp(np.arctan2(*outline[on_front][:, 1:].T)) > 6.0
+    assert np.abs(across - 30.0).max() < 4.0
+
+
+def test_outline_distance_ignores_sliding():
+    """Across the outline a shift counts in full; along it, or along the ray, not at all."""
+    i, j, j_from_i = balls(60.0, CameraModel.ORTHOGRAPHIC)
+    pair = contour_pair(i, j, j_from_i)
+    camera, radius = j.scan.image.camera, 10 * j.scan.image.pixel
+    for direction, gain in ((np.array([0.0, 0.0, 1.0]), 0.0), (np.array([1.0, 0.0, 0.0]), 1.0)):
+        moved = ContourPoints(
+            pixels=pair.observed.pixels,
+            points=pair.observed.points + direction * j.scan.image.pixel,
+            normals=pair.observed.normals,
+        )
+        matches = outline_matches(
+            ContourPair(predicted=moved, observed=pair.observed), camera, radius
+        )
+        assert len(matches) > 50
+        np.testing.assert_allclose(matches.directions[:, 2], 0.0, atol=1e-12)
+        if gain == 0.0:
+            assert np.median(np.abs(matches.residuals)) < 1e-9
+        else:
+            assert np.abs(matches.residuals).max() > 0.9 * j.scan.image.pixel
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("gap", "degrees"), [(60, 0.0), (60, 20.0), (90, 20.0)])
+def test_mm_icc_keeps_and_finds_the_truth(model: CameraModel, gap: int, degrees: float):
+    """Right to half a pixel, where point to plane finds no match at all."""
+    pair = creature_pair(gap, model)
+    i, j = pair.scans
+    aligned = refine_pair(i, j, nudged(pair, degrees), CONFIG)
+    angle, shift = pair.off_by(aligned.i_from_j)
+    assert angle < 1.2
+    assert shift < 0.005
+    assert aligned.coherence > 0.5
+    assert aligned.num_matches > 50
+
+
+def test_published_residual_finds_the_truth_less_closely():
+    pair = creature_pair(60)
+    start = nudged(pair, 20.0)
+    literal = refine_pair(*pair.scans, start, ContoursConfig(residual="point", trim=0.7))
+    angle, shift = pair.off_by(literal.i_from_j)
+    assert angle < 2.0
+    assert shift < 0.01
+
+
+def test_mm_icc_does_not_care_which_scan_comes_first():
+    pair = creature_pair(60)
+    i, j = pair.scans
+    start = nudged(pair, 10.0)
+    forth = refine_pair(i, j, start, CONFIG).i_from_j
+    back = refine_pair(j, i, start.inverse(), CONFIG).i_from_j
+    off = forth @ back
+    assert off.angle_deg() < 0.2
+    assert off.shift_at(i.mesh.vertices.mean(axis=0)) < 0.002 * pair.diameter
+
+
+def test_unit_of_length_does_not_matter():
+    small, large = creature_pair(60), creature_pair(60, factor=1000.0)
+    a = refine_pair(*small.scans, nudged(small, 10.0), CONFIG)
+    b = refine_pair(*large.scans, nudged(large, 10.0), CONFIG)
+    np.testing.assert_allclose(a.i_from_j.rotation, b.i_from_j.rotation, atol=1e-4)
+    np.testing.assert_allclose(
+        1000.0 * a.i_from_j.translation, b.i_from_j.translation, atol=1e-4 * large.diameter
+    )
+    assert b.coherence == pytest.approx(a.coherence, abs=0.01)
+
+
+def test_wrong_poses_do_not_cohere():
+    pair = creature_pair(60)
+    right = refine_pair(*pair.scans, pair.i_from_j, CONFIG).coherence
+    wrong = refine_pair(*pair.scans, nudged(pair, 120.0), CONFIG).coherence
+    assert wrong < 0.6 * right
+
+
+def test_too_few_contours_leave_the_pose():
+    """Scans whose contours see nothing of each other: the pose stays, and the count says why."""
+    pair = creature_pair(60)
+    far = Pose(rotation=np.eye(3), translation=np.array([1e3 * pair.diameter, 0.0, 0.0]))
+    start = far @ pair.i_from_j
+    aligned = refine_pair(*pair.scans, start, CONFIG)
+    assert aligned.num_matches == 0
+    assert aligned.coherence == 0.0
+    np.testing.assert_array_equal(aligned.i_from_j.matrix(), start.inverse().inverse().matrix())
+
+
+def test_trimmed_icp_undoes_a_motion():
+    """Contours that coincide at the truth, one third of them spoiled: the rest decides."""
+    i, j, j_from_i = balls(60.0, CameraModel.PINHOLE)
+    pairs = contour_pair(i, j, j_from_i), contour_pair(j, i, j_from_i.inverse())
+    pose, squares = trimmed_icp(pairs, j_from_i, CONFIG)
+    assert len(squares) > 50
+    assert np.sqrt(squares.mean()) < 3 * j.scan.image.pixel
+    assert (pose @ j_from_i.inverse()).angle_deg() < 3.0
+
+
+def test_rigid_fit_is_exact():
+    rng = np.random.default_rng(1)
+    points, motion = (
+        rng.normal(size=(20, 3)),
+        Pose(rotation=random_rotation(rng), translation=rng.normal(size=3)),
+    )
+    found = rigid_fit(points, motion.apply(points))
+    np.testing.assert_allclose(found.matrix(), motion.matrix(), atol=1e-9)
+
+
+def test_contour_matcher_speaks_of_scans_by_number():
+    pair = creature_pair(60)
+    matches = contour_matcher(pair.scans, CONFIG)(0, 1, pair.i_from_j.inverse())
+    pixel = pair.scans[1].image.pixel
+    assert len(matches) > 20
+    assert np.abs(matches.residuals).max() <= 4 * pixel
+    seen, _ = pair.scans[1].image.camera.project(matches.points)
+    assert (np.abs(seen - seen.round()) < 1e-6).all()
