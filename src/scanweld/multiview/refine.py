@@ -111,7 +111,7 @@ def refine_poses(
     surface = _match_surfaces(sources, poses, config.match_diameters[1] * diameter)
     terms = weighted_terms(surface, [], poses, 0.0, noise)
     rms = _rms(terms)
-    logger.info("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
+    logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
     return Refinement(poses=poses, pairs=_residuals(terms), rms=rms, step=step)
 
 
