@@ -14,7 +14,7 @@ import csv
 import json
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -32,12 +32,10 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
 from scanweld.io import read_poses, read_scan
-from scanweld.pairs.anchors import pair_anchors
-from scanweld.pairs.field import ScanField, make_field
-from scanweld.pairs.hypotheses import Anchors
-from scanweld.pairs.register import register_pair
-from scanweld.pairs.result import Alternative, PairKind
+from scanweld.pairs.field import make_field
+from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.parallel import map_in_order, single_threaded_algebra
+from scanweld.pipeline import pair_registrar
 from scanweld.prepare.prepare import prepare
 from sets import BUNNY, data_folder, dragon, moved_scans
 
@@ -120,10 +118,8 @@ class _Scene:
     """The scans of an object, moved and laid out, with their reference poses."""
 
     prepared: dict[str, PreparedScan]
-    fields: dict[str, ScanField]
-    anchors: dict[str, tuple[Anchors, ...]]
+    register: Callable[[tuple[int, int]], PairResult]
     reference: dict[str, Pose]
-    run_diameter: float
     object_diameter: float
 
     def errors(self, i: str, j: str, alternative: Alternative) -> tuple[float, float]:
@@ -148,7 +144,7 @@ def answers_of(name: str, seed: int, options: argparse.Namespace) -> list[Answer
             for row in csv.DictReader((data / "overlaps.csv").open(encoding="utf-8"))
             if float(row["rotation_deg"]) <= max_gap_deg
         ]
-        answer = lambda row: _answer(name, seed, row, scene, config)  # noqa: E731
+        answer = lambda row: _answer(name, seed, row, scene)  # noqa: E731
         found: list[Answer] = []
         for each in map_in_order(answer, rows, options.workers):
             found.append(each)
@@ -168,32 +164,20 @@ def _lay_out(data: Path, names: tuple[str, ...], seed: int, config: Config, work
     features = [None] * len(prepared)
     if config.pairs.keypoints != "even":
         features = list(map_in_order(lambda scan: describe(scan, config.heat), prepared, workers))
-    anchors = [
-        pair_anchors(field, found, diameter, config.pairs)
-        for field, found in zip(fields, features, strict=True)
-    ]
     return _Scene(
         prepared=dict(zip(names, prepared, strict=True)),
-        fields=dict(zip(names, fields, strict=True)),
-        anchors=dict(zip(names, anchors, strict=True)),
+        register=pair_registrar(prepared, features, fields, diameter, config),
         reference=reference,
-        run_diameter=diameter,
         object_diameter=object_diameter(moved, reference),
     )
 
 
-def _answer(name: str, seed: int, row: Mapping[str, str], scene: _Scene, config: Config) -> Answer:
-    i, j = row["i"], row["j"]
+def _answer(name: str, seed: int, row: Mapping[str, str], scene: _Scene) -> Answer:
+    names = list(scene.prepared)
+    first, second = sorted((names.index(row["i"]), names.index(row["j"])))
+    i, j = names[first], names[second]
     start = time.perf_counter()
-    result = register_pair(
-        0,
-        1,
-        scene.fields[i],
-        scene.fields[j],
-        list(zip(scene.anchors[i], scene.anchors[j], strict=True)),
-        scene.run_diameter,
-        config.pairs,
-    )
+    result = scene.register((first, second))
     seconds = time.perf_counter() - start
     errors = [scene.errors(i, j, alternative) for alternative in result.alternatives]
     right = [

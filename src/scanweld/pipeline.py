@@ -1,7 +1,7 @@
 """Scans -> reconstruction: the method from top to bottom."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -104,19 +104,11 @@ def _register_pairs(
 ) -> dict[tuple[int, int], PairResult]:
     """Judge every pair of scans from any start pose."""
     edges = list(combinations(range(len(fields)), 2))
-    anchors = [
-        pair_anchors(field, found, intake.diameter, config.pairs)
-        for field, found in zip(fields, features, strict=True)
-    ]
-
-    def register(edge: tuple[int, int]) -> PairResult:
-        i, j = edge
-        both = list(zip(anchors[i], anchors[j], strict=True))
-        return register_pair(i, j, fields[i], fields[j], both, intake.diameter, config.pairs)
+    register = pair_registrar(intake.prepared, features, fields, intake.diameter, config)
 
     def key(edge: tuple[int, int]) -> str:
         hashes = [intake.prepared[k].content_hash for k in edge]
-        settings = (config.prepare, config.heat, config.pairs)
+        settings = (config.prepare, config.heat, config.pairs, config.contours, config.refine)
         return work_key("pair", *hashes, intake.diameter, *settings)
 
     with stages.stage("pairs") as counts:
@@ -126,6 +118,34 @@ def _register_pairs(
         edge: replace(result, i=edge[0], j=edge[1])
         for edge, result in zip(edges, results, strict=True)
     }
+
+
+def pair_registrar(
+    prepared: Sequence[PreparedScan],
+    features: Sequence[Features | None],
+    fields: Sequence[ScanField],
+    diameter: float,
+    config: Config,
+) -> Callable[[tuple[int, int]], PairResult]:
+    """What registers a pair (i, j), i < j, of the given scans: search, then MM-ICC's contours."""
+    anchors = [
+        pair_anchors(field, found, diameter, config.pairs)
+        for field, found in zip(fields, features, strict=True)
+    ]
+    match_contours = contour_matcher(prepared, config.contours)
+
+    def register(edge: tuple[int, int]) -> PairResult:
+        i, j = edge
+
+        def polish(i_from_j: Pose) -> Pose:
+            start = {i: Pose.identity(), j: i_from_j}
+            refined = refine_poses(prepared, start, [edge], config.refine, match_contours).poses
+            return refined[i].inverse() @ refined[j]
+
+        both = list(zip(anchors[i], anchors[j], strict=True))
+        return register_pair(i, j, fields[i], fields[j], both, diameter, config.pairs, polish)
+
+    return register
 
 
 def _build_graph(

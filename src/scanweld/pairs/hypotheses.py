@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.result import CONTRADICT_WEIGHT, FREE_WEIGHT, VIOLATION_WEIGHT
+from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
 from scanweld.pairs.visibility import (
     AGREE,
     CONTRADICT,
@@ -24,11 +24,14 @@ NUM_SECOND_LOOK = 64
 FIRST_LOOK_FLOOR = -0.35
 """Score of the first few samples below which a hypothesis is not looked at again."""
 
+SEARCH_FREE_WEIGHT = 1.0
+"""The silhouette guides the search more than it speaks against an answer: real ones have gaps."""
+
 WEIGHTS = np.zeros(7)
 WEIGHTS[AGREE] = 1.0
 WEIGHTS[FRONT] = -VIOLATION_WEIGHT
 WEIGHTS[CONTRADICT] = -CONTRADICT_WEIGHT
-WEIGHTS[FREE] = -FREE_WEIGHT
+WEIGHTS[FREE] = -SEARCH_FREE_WEIGHT
 WEIGHTS.flags.writeable = False
 
 

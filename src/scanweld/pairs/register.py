@@ -1,5 +1,7 @@
 """Two scans -> distinct relative poses with their evidence, from any start pose."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from scanweld.config import PairsConfig
@@ -11,7 +13,7 @@ from scanweld.pairs.hypotheses import WEIGHTS, Anchors, sweep
 from scanweld.pairs.icp import IcpSchedule, information_of, refine_poses
 from scanweld.pairs.result import Alternative, PairResult
 from scanweld.pairs.verdict import judge_pair
-from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence
+from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
 
 SAME_ANGLE_DEG = 8.0
 SAME_SHIFT_DIAMETERS = 0.04
@@ -20,8 +22,15 @@ RIVAL_SHIFT_DIAMETERS = 0.06
 MAX_SWEPT = 4000
 NUM_COARSE_SAMPLES = 200
 NUM_FINE_SAMPLES = 400
-SWEPT_SHARE = 0.5
-"""Hypotheses below this share of the sweep's best score are not refined."""
+NUM_POLISHED = 2
+"""Alternatives that are refined with all points and contours, at most."""
+MIN_POLISHED_SCORE = -0.1
+"""Score below which an alternative is not worth it."""
+MAX_POLISHING_LOSS = 0.04
+"""Score that a refinement may cost: the search has looked for samples that agree by chance."""
+
+Polish = Callable[[Pose], Pose]
+"""A refinement of i_from_j for the two scans at hand, sensor frames."""
 
 
 def register_pair(
@@ -32,6 +41,7 @@ def register_pair(
     anchors: list[tuple[Anchors, Anchors]],
     diameter: float,
     config: PairsConfig,
+    polish: Polish | None = None,
 ) -> PairResult:
     """Find the poses that explain two scans best, coarse to fine, whatever their frames are.
 
@@ -43,6 +53,7 @@ def register_pair(
         anchors: Sets of anchors of i and j; all pairs within a set are tried.
         diameter: Diameter of the run.
         config: Settings.
+        polish: Refines the best poses once more; what makes the evidence worse is not taken.
 
     Returns:
         The result, with pose i_from_j between the sensor frames.
@@ -75,7 +86,15 @@ def register_pair(
         poses = poses[np.argsort(-scores, kind="stable")]
         is_last = schedule is near
         poses = _distinct(poses, field_j, diameter, count, rivals=is_last)
-    return _result(i, j, field_i, field_j, poses, diameter, config)
+    alternatives = [alternative_at(field_i, field_j, to_pose(row), fine) for row in poses]
+    alternatives.sort(key=lambda alternative: -alternative.score)
+    for k, alternative in enumerate(alternatives[:NUM_POLISHED]):
+        if polish is not None and alternative.score > MIN_POLISHED_SCORE:
+            polished = alternative_at(field_i, field_j, polish(alternative.i_from_j), fine)
+            if polished.score > alternative.score - MAX_POLISHING_LOSS:
+                alternatives[k] = polished
+    alternatives.sort(key=lambda alternative: -alternative.score)
+    return _result(i, j, field_i, field_j, tuple(alternatives), diameter, config)
 
 
 def score_poses(
@@ -100,21 +119,16 @@ def _result(
     j: int,
     field_i: ScanField,
     field_j: ScanField,
-    poses: FloatArray,
+    alternatives: tuple[Alternative, ...],
     diameter: float,
     config: PairsConfig,
 ) -> PairResult:
-    tolerance = config.tolerance_diameters[2] * diameter
-    alternatives = sorted(
-        (alternative_at(field_i, field_j, to_pose(row), tolerance) for row in poses),
-        key=lambda alternative: -alternative.score,
-    )
-    best = alternatives[0].i_from_j if alternatives else None
     information, rms = np.zeros((6, 6)), float("nan")
-    if best is not None:
-        row = np.r_[best.rotation.ravel(), best.translation]
-        information, rms, _ = information_of(field_i, field_j, row, tolerance, diameter)
-    return judge_pair(i, j, tuple(alternatives), information, rms, config)
+    if alternatives:
+        radius = config.tolerance_diameters[2] * diameter
+        (row,) = pose_rows([alternatives[0].i_from_j])
+        information, rms, _ = information_of(field_i, field_j, row, radius, diameter)
+    return judge_pair(i, j, alternatives, information, rms, config)
 
 
 def alternative_at(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> Alternative:

@@ -10,7 +10,7 @@ from scanweld.geometry.pose import Pose
 
 VIOLATION_WEIGHT = 3.0
 CONTRADICT_WEIGHT = 1.5
-FREE_WEIGHT = 1.0
+FREE_WEIGHT = 1.0 / 3.0
 
 
 class PairKind(StrEnum):
