@@ -1,0 +1,267 @@
+"""End to end on small rendered scenes: scans to poses, model and verdict."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scanweld import pipeline
+from scanweld.config import Config, FusionConfig, HeatConfig, PrepareConfig
+from scanweld.errors import InputError
+from scanweld.evaluation.metrics import (
+    Standing,
+    evaluate_poses,
+    object_diameter,
+    scan_centroids,
+)
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import PoseSet
+from scanweld.pairs.result import PairResult
+from scanweld.progress import Cache
+from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+from tests.prepared import scaled
+from tests.scenes import MILD_NOISE, Scene, creature_scene, primitive_scene
+
+CONFIG = Config(
+    prepare=PrepareConfig(num_samples=500),
+    heat=HeatConfig(num_modes=60, max_front_vertices=600),
+    fusion=FusionConfig(max_voxels_across=60),
+)
+"""Smaller than the defaults, for speed; what decides between right and wrong is untouched."""
+
+
+@lru_cache
+def creature() -> Scene:
+    return creature_scene(8, pixels=170, noise=MILD_NOISE, seed=3)
+
+
+@lru_cache
+def creature_run() -> Reconstruction:
+    return run(creature().scans)
+
+
+@lru_cache
+def few_run() -> Reconstruction:
+    return run(few())
+
+
+def few() -> tuple[RangeScan, ...]:
+    """Four neighbouring scans."""
+    return creature().scans[:4]
+
+
+def run(scans: Sequence[RangeScan], workers: int = 1, cache: Cache | None = None) -> Reconstruction:
+    result = pipeline.run(scans, CONFIG, workers=workers, cache=cache)
+    assert_sound(result, scans)
+    return result
+
+
+def assert_sound(result: Reconstruction, scans: Sequence[RangeScan]) -> None:
+    """Every scan is accounted for once; what has no pose has a reason."""
+    names = {scan.name for scan in scans}
+    assert set(result.poses) | set(result.unplaced) == names == set(result.scans)
+    assert not set(result.poses) & set(result.unplaced)
+    assert sorted(name for c in result.components for name in c) == sorted(result.poses)
+    for component in result.components:
+        assert result.poses[component[0]].angle_deg() == 0.0
+    for name, report in result.scans.items():
+        assert (report.verdict is ScanVerdict.UNPLACED) == (name in result.unplaced)
+        assert report.reason
+    assert (result.verdict is Verdict.GOOD) == (not result.reasons)
+
+
+def errors_of(result: Reconstruction, truth: dict[str, Pose], scans: Sequence[RangeScan]):
+    return evaluate_poses(
+        PoseSet(poses=dict(result.poses), components=result.components),
+        truth,
+        centroids=scan_centroids(scans),
+        diameter=object_diameter(scans, truth),
+    )
+
+
+def bytes_of(result: Reconstruction) -> list[bytes]:
+    """Poses by name, and the mesh."""
+    mesh = result.mesh
+    assert mesh is not None
+    told = [pose.matrix().tobytes() for _, pose in sorted(result.poses.items())]
+    return [*told, mesh.vertices.tobytes(), mesh.faces.tobytes()]
+
+
+def test_all_scans_are_placed_exactly():
+    scene, result = creature(), creature_run()
+    assert result.verdict is Verdict.GOOD and result.verdict.exit_code == 0
+    assert len(result.components) == 1 and len(result.poses) == 8
+    errors = errors_of(result, scene.world_from_scan, scene.scans)
+    assert errors.count(Standing.RIGHT) == 8
+    assert errors.rotations_deg.max() < 0.5
+    assert errors.translations_percent.max() < 0.5
+
+
+def test_the_model_is_the_object():
+    """Its vertices lie on the object, in the frame of the component's first scan."""
+    scene, result = creature(), creature_run()
+    assert result.mesh is not None
+    posed = scene.world_from_scan[result.components[0][0]].apply(result.mesh.vertices)
+    surface = scene.mesh.vertices[scene.mesh.faces].mean(axis=1)
+    apart = np.array([np.linalg.norm(surface - p, axis=1).min() for p in posed[::50]])
+    assert np.median(apart) < 0.015 * 210 and len(result.mesh.faces) > 1000
+
+
+def test_the_report_names_every_pair_and_stage():
+    result = creature_run()
+    names = sorted(result.poses)
+    every = [(a, b) for n, a in enumerate(names) for b in names[n + 1 :]]
+    assert [(pair.i, pair.j) for pair in result.pairs] == every
+    for pair in result.pairs:
+        if pair.accepted:
+            assert pair.i_from_j is not None
+            said = result.poses[pair.i].inverse() @ result.poses[pair.j]
+            assert (said.inverse() @ pair.i_from_j).angle_deg() < 5
+            assert pair.i in result.scans[pair.j].edges
+        else:
+            assert pair.reason
+    assert {"prepare", "features", "pairs", "graph", "refine", "fuse"} <= set(result.stages)
+
+
+def test_workers_order_and_names_do_not_change_a_byte():
+    """Two workers, scans reversed, renamed so that their order by name turns round too."""
+    scene, result = creature(), creature_run()
+    renamed = {scan.name: f"view_{9 - k}" for k, scan in enumerate(scene.scans)}
+    again = run([replace(s, name=renamed[s.name]) for s in scene.scans[::-1]], workers=2)
+    assert again.verdict is result.verdict
+    for name, pose in result.poses.items():
+        assert again.poses[renamed[name]].matrix().tobytes() == pose.matrix().tobytes()
+    assert again.components == tuple(tuple(renamed[n] for n in c) for c in result.components)
+    assert bytes_of(again)[-2:] == bytes_of(result)[-2:]
+
+
+class Memory:
+    """A cache that counts what it is asked to keep."""
+
+    def __init__(self) -> None:
+        self.kept: dict[str, object] = {}
+        self.num_put = 0
+
+    def get(self, key: str) -> object | None:
+        return self.kept.get(key)
+
+    def put(self, key: str, value: object) -> None:
+        self.num_put += 1
+        self.kept[key] = value
+
+
+def test_a_second_run_recomputes_nothing(monkeypatch: pytest.MonkeyPatch):
+    scans, memory, calls = few(), Memory(), []
+    register = pipeline.register_pair
+
+    def counted(*arguments: Any) -> PairResult:
+        calls.append(arguments[:2])
+        return register(*arguments)
+
+    monkeypatch.setattr(pipeline, "register_pair", counted)
+    first = run(scans, cache=memory)
+    assert len(calls) == 6 and memory.num_put >= 6
+    kept = memory.num_put
+    second = run(scans[::-1], cache=memory)
+    assert len(calls) == 6 and memory.num_put == kept
+    assert bytes_of(first) == bytes_of(second)
+    third = run(scans[:3], cache=memory)
+    assert len(third.poses) + len(third.unplaced) == 3
+
+
+def test_another_unit_changes_nothing_but_the_unit():
+    near, far = few_run(), run([scaled(scan, 1000.0) for scan in few()])
+    assert far.verdict is near.verdict is Verdict.GOOD
+    first = near.components[0][0]
+    for name in near.poses:
+        a, b = (result.poses[first].inverse() @ result.poses[name] for result in (near, far))
+        np.testing.assert_allclose(b.rotation, a.rotation, atol=1e-3)
+        np.testing.assert_allclose(b.translation, 1000 * a.translation, atol=1000 * 0.3)
+
+
+# What does not belong
+
+
+def test_a_scan_of_something_else_is_left_out():
+    stranger = replace(primitive_scene("box").scans[0], name="stranger")
+    result = run([*few(), stranger])
+    assert result.verdict is Verdict.PARTIAL and result.verdict.exit_code == 3
+    assert set(result.unplaced) == {"stranger"}
+    truth = {scan.name: creature().world_from_scan[scan.name] for scan in few()}
+    errors = errors_of(result, truth, few())
+    assert errors.count(Standing.RIGHT) == 4 and errors.count(Standing.WRONG) == 0
+
+
+def test_two_objects_become_two_components():
+    other = creature_scene(8, pixels=170, noise=MILD_NOISE, seed=4, object_seed=5)
+    theirs = [replace(scan, name=f"other_{k}") for k, scan in enumerate(other.scans[:3])]
+    mine = few()[:3]
+    result = run([*theirs, *mine])
+    assert len(result.components) == 2 and result.verdict is not Verdict.GOOD
+    truths = ({s.name: creature().world_from_scan[s.name] for s in mine}, {
+        s.name: other.world_from_scan[t.name] for s, t in zip(theirs, other.scans, strict=False)
+    })  # fmt: skip
+    for scans, truth in zip((mine, theirs), truths, strict=True):
+        (component,) = (c for c in result.components if c[0] in truth)
+        assert set(component) <= set(truth)
+        poses = PoseSet(
+            poses={name: result.poses[name] for name in component}, components=(component,)
+        )
+        errors = evaluate_poses(
+            poses, truth, centroids=scan_centroids(scans), diameter=object_diameter(scans, truth)
+        )
+        assert errors.count(Standing.RIGHT) == 3
+
+
+@pytest.mark.parametrize("name", ["sphere", "cylinder"])
+def test_of_objects_that_slide_nothing_is_asserted(name: str):
+    result = run(primitive_scene(name, pixels=70).scans[:3])
+    assert result.verdict is Verdict.NOTHING
+    assert not result.poses and result.mesh is None
+    assert len(result.unplaced) == 3
+
+
+def test_a_scan_in_another_unit_is_named():
+    scans = list(few()[:3])
+    scans[2] = replace(scaled(scans[2], 0.001), name="in_metres")
+    result = run(scans)
+    assert "smaller" in result.unplaced["in_metres"] and "m and mm" in result.unplaced["in_metres"]
+    assert len(result.poses) == 2 and result.verdict is Verdict.PARTIAL
+
+
+def test_a_duplicate_is_kept_once_and_named():
+    scans = list(few()[:2])
+    result = run([replace(scans[0], name="zz_copy"), *scans])
+    assert result.unplaced == {"zz_copy": "same content as scan_01, which is kept"}
+    assert set(result.poses) == {"scan_01", "scan_02"}
+
+
+def test_what_could_not_be_read_is_named():
+    scans = few()[:2]
+    result = pipeline.run(scans, CONFIG, unreadable={"broken": "the file ends early"}, workers=1)
+    assert result.unplaced == {"broken": "the file ends early"}
+    assert result.scans["broken"].verdict is ScanVerdict.UNPLACED
+    assert result.verdict is Verdict.PARTIAL
+
+
+def test_fewer_than_two_usable_scans_are_an_error():
+    (scan,) = few()[:1]
+    dots = RangeScan(name="dots", points=60 * np.random.default_rng(0).normal(size=(10, 3)))
+    copy = replace(scan, name="copy")
+    for scans in ([], [scan], [scan, copy], [scan, dots]):
+        with pytest.raises(InputError) as raised:
+            pipeline.run(scans, CONFIG, workers=1)
+        told = str(raised.value)
+        assert "at least 2" in told and len(told.splitlines()) == 1
+    with pytest.raises(InputError, match=r"dots: a scan of 10 points"):
+        pipeline.run([scan, dots], CONFIG, workers=1)
+
+
+def test_two_scans_of_one_name_are_an_error():
+    scans = [replace(scan, name="same") for scan in few()[:2]]
+    with pytest.raises(InputError, match="same name"):
+        pipeline.run(scans, CONFIG)
