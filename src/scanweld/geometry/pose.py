@@ -127,8 +127,8 @@ def rotation_log(rotation: FloatArray) -> FloatArray:
         return skew * (angle / sine)
     if cosine > 0:
         return skew
-    # Half a turn: the axis is the largest column of R + I, its sign is free.
-    columns = rotation + np.eye(3)
+    # Half a turn: the axis is the largest column of the symmetric part of R + I, its sign is free.
+    columns = 0.5 * (rotation + rotation.T) + np.eye(3)
     axis = columns[:, int(np.argmax(np.diag(columns)))]
     axis = axis / np.linalg.norm(axis)
     sign = -1.0 if float(axis @ skew) < 0 else 1.0
