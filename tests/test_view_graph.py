@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from scanweld.config import GraphConfig
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.multiview.assemble import build_view_graph
+from scanweld.multiview.explain import find_doubts
+from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Judge
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult
@@ -129,9 +131,11 @@ def graph_of(
 ) -> ViewGraph:
     judge = judge or judge_of(world, pairs)
     centres = [CENTRE] * len(world)
-    graph = build_view_graph(len(world), pairs, centres, 1.0, judge, settle, GraphConfig())
+    config = GraphConfig()
+    graph = build_view_graph(len(world), pairs, centres, 1.0, judge, settle, config)
+    graph = replace(graph, doubts=find_doubts(graph, judge, config))
     assert_sound(graph, len(world), pairs)
-    return graph
+    return replace(graph, doubts=find_doubts(graph, judge, GraphConfig()))
 
 
 def assert_sound(graph: ViewGraph, num_scans: int, pairs: Pairs) -> None:

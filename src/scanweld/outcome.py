@@ -77,20 +77,14 @@ def _poses(prepared: Sequence[PreparedScan], graph: ViewGraph) -> dict[str, Pose
     """world_from_scan: the world of a component is its reference's scan frame."""
     poses = {}
     for component in graph.components:
-        world_from_reference = _scan_from_sensor(prepared[component.reference])
+        world_from_reference = prepared[component.reference].scan_from_sensor
         for k, pose in sorted(component.poses.items()):
-            sensor_from_scan = _scan_from_sensor(prepared[k]).inverse()
+            sensor_from_scan = prepared[k].scan_from_sensor.inverse()
             is_reference = k == component.reference
             poses[prepared[k].name] = (
                 Pose.identity() if is_reference else world_from_reference @ pose @ sensor_from_scan
             )
     return dict(sorted(poses.items()))
-
-
-def _scan_from_sensor(scan: PreparedScan) -> Pose:
-    pose = scan.scan.scan_from_sensor
-    assert pose is not None, "a prepared scan has a located sensor"
-    return pose
 
 
 def _unplaced_report(scan: RangeScan | None, reason: str) -> ScanReport:
@@ -179,7 +173,7 @@ def _pair_report(
 
     def between_scans(i_from_j: Pose) -> Pose:
         pose = i_from_j.inverse() if is_swapped else i_from_j
-        return _scan_from_sensor(first) @ pose @ _scan_from_sensor(second).inverse()
+        return first.scan_from_sensor @ pose @ second.scan_from_sensor.inverse()
 
     return PairReport(
         i=first.name,

@@ -18,8 +18,9 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import Features, describe
 from scanweld.intake import Intake, take_in
 from scanweld.multiview.assemble import build_view_graph
+from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Judge
-from scanweld.multiview.refine import refine_poses
+from scanweld.multiview.refine import refine_poses, scan_rms
 from scanweld.multiview.view_graph import Component, ViewGraph
 from scanweld.outcome import conclude
 from scanweld.pairs.anchors import pair_anchors
@@ -194,21 +195,28 @@ def _refine(
     judge_pair = make_judge(fields, intake.diameter, config)
     contours = contour_matcher(intake.prepared, config.contours)
 
+    rms: dict[int, float] = {}
+
     def refine(component: Component) -> Component:
         edges = [edge for edge in graph.accepted if edge[0] in component.poses]
         start = dict(component.poses)
-        refined = dict(refine_poses(intake.prepared, start, edges, config.refine, contours).poses)
-        if _support(refined, edges, judge_pair) < _support(start, edges, judge_pair) - 0.01:
+        refined = refine_poses(intake.prepared, start, edges, config.refine, contours)
+        if _support(refined.poses, edges, judge_pair) < _support(start, edges, judge_pair) - 0.01:
             logger.warning("the joint refinement made the evidence worse and is left out")
             return component
-        to_reference = refined[component.reference].inverse()
-        poses = {k: to_reference @ pose for k, pose in refined.items()}
-        return replace(component, poses=poses)
+        rms.update(scan_rms(refined))
+        to_reference = refined.poses[component.reference].inverse()
+        return replace(
+            component, poses={k: to_reference @ pose for k, pose in refined.poses.items()}
+        )
 
     with stages.stage("refine") as counts:
         components = tuple(refine(component) for component in graph.components)
+        graph = replace(graph, components=components, rms=rms)
+        graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
         counts["scans"] = sum(len(component.poses) for component in components)
-    return replace(graph, components=components)
+        counts["doubtful"] = len(graph.doubts)
+    return graph
 
 
 def _support(
@@ -227,8 +235,7 @@ def _fuse(
         return None
     component = graph.components[0]
     order = sorted(component.poses)
-    reference = prepared[component.reference].scan.scan_from_sensor
-    assert reference is not None
+    reference = prepared[component.reference].scan_from_sensor
     with stages.stage("fuse") as counts:
         try:
             mesh = fuse(

@@ -50,7 +50,8 @@ class ScanReport:
         content_hash: Hash of the scan's content; None if it could not be read.
         num_keypoints: PA-HKS keypoints.
         edges: Names of the scans it has an accepted pair with.
-        overlap: Share of its surface that some other placed scan saw too; None if unplaced.
+        overlap: Largest share of its samples that agree with one other placed scan; None if
+            unplaced.
         rms: Point-to-plane residual after the joint refinement, in the scans' unit.
     """
 

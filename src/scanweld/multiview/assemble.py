@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from scanweld.config import GraphConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
+from scanweld.multiview.explain import why_rejected, why_unplaced
 from scanweld.multiview.merge import Judge, Merge, Support, is_near, propose_merges
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
@@ -192,25 +193,19 @@ def _graph(problem: _Problem, assembly: _Assembly) -> ViewGraph:
     components.sort(key=lambda c: (-len(c.poses), min(c.poses)))
     placed = {scan for c in components for scan in c.poses}
     rejected = {
-        edge: _why_rejected(problem, edge, components)
+        edge: why_rejected(problem.pairs[edge], components, problem.centres, problem.near)
         for edge in sorted(problem.pairs)
         if edge not in accepted
     }
     unplaced = {
-        k: _why_unplaced(problem, k, components)
-        for k in range(problem.num_scans)
-        if k not in placed
+        k: why_unplaced(k, problem.pairs) for k in range(problem.num_scans) if k not in placed
     }
-    doubts = {}
-    for component in components:
-        doubts.update(_doubts(problem, component, accepted))
     return ViewGraph(
         pairs=problem.pairs,
         accepted=dict(sorted(accepted.items())),
         rejected=rejected,
         components=tuple(components),
         unplaced=unplaced,
-        doubts=doubts,
     )
 
 
@@ -225,61 +220,3 @@ def _component(poses: Mapping[int, Pose], accepted: Mapping[Edge, Alternative]) 
     moved = {k: to_reference @ pose for k, pose in poses.items()}
     moved[reference] = Pose.identity()
     return Component(poses=moved, reference=reference)
-
-
-def _why_rejected(problem: _Problem, edge: Edge, components: Sequence[Component]) -> str:
-    result = problem.pairs[edge]
-    home = next((c for c in components if edge[0] in c.poses and edge[1] in c.poses), None)
-    if result.best is None or home is None:
-        return result.reason or "its scans could not be placed together without contradictions"
-    i_from_j = home.poses[edge[0]].inverse() @ home.poses[edge[1]]
-    apart = i_from_j.inverse() @ result.best.i_from_j
-    if not is_near(result.best.i_from_j, i_from_j, problem.centres[edge[1]], problem.near):
-        return f"cycle: {apart.angle_deg():.1f} deg off what the other pairs say"
-    return result.reason or f"score {result.best.score:.2f} too low to hold"
-
-
-def _why_unplaced(problem: _Problem, scan: int, components: Sequence[Component]) -> str:
-    options = [
-        (result.best.score, result)
-        for edge, result in sorted(problem.pairs.items())
-        if scan in edge and result.best is not None
-    ]
-    if not options:
-        return "no pose brings it onto any other scan"
-    score, result = max(options, key=lambda option: option[0])
-    told = result.reason or "it contradicts other scans"
-    return f"no pair with another scan holds; the best one (score {score:.2f}): {told}"
-
-
-def _doubts(
-    problem: _Problem, component: Component, accepted: Mapping[Edge, Alternative]
-) -> dict[int, str]:
-    """Placed scans that the final poses do not bear out."""
-    doubts = {}
-    for k in component.poses:
-        others = [m for m in component.poses if m != k]
-        evidence = [
-            problem.judge(k, m, component.poses[k].inverse() @ component.poses[m]) for m in others
-        ]
-        agree = sum(e.agree for e in evidence)
-        violated = sum(e.front + 0.5 * e.contradict for e in evidence)
-        if violated > problem.config.max_violated_share * agree:
-            doubts[k] = (
-                f"other sensors saw through its surface ({violated / max(agree, 1e-9):.0%} of what "
-                "agrees)"
-            )
-        elif not any(k in edge for edge in accepted):
-            doubts[k] = "no single pair confirms its pose"
-    shut_out = [
-        edge
-        for edge, result in problem.pairs.items()
-        if result.kind is PairKind.GOOD
-        and edge not in accepted
-        and edge[0] in component.poses
-        and edge[1] in component.poses
-    ]
-    for edge in shut_out:
-        for k in edge:
-            doubts.setdefault(k, "a good pair disagrees with its pose")
-    return doubts

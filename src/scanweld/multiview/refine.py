@@ -115,6 +115,17 @@ def refine_poses(
     return Refinement(poses=poses, pairs=_residuals(terms), rms=rms, step=step)
 
 
+def scan_rms(refinement: Refinement) -> dict[int, float]:
+    """Residual rms of each scan that has matches, over all its pairs; in the scans' unit."""
+    sums: dict[int, tuple[float, int]] = {}
+    for pair, residual in refinement.pairs.items():
+        for k in pair:
+            square, count = sums.get(k, (0.0, 0))
+            added = residual.num_matches * residual.rms**2
+            sums[k] = square + added, count + residual.num_matches
+    return {k: float(np.sqrt(square / count)) for k, (square, count) in sorted(sums.items())}
+
+
 def _match_surfaces(
     sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], radius: float
 ) -> list[Found]:

@@ -32,7 +32,7 @@ class ViewGraph:
         rejected: Why the other pairs are not used.
         components: Of at least two scans, largest first.
         unplaced: Why the other scans are in none.
-        doubts: What speaks against a placed scan, in words.
+        doubts: What speaks against a placed scan's final pose, in words.
         rms: Point-to-plane residual of each placed scan after the joint refinement.
     """
 
@@ -41,7 +41,7 @@ class ViewGraph:
     rejected: Mapping[Edge, str]
     components: tuple[Component, ...]
     unplaced: Mapping[int, str]
-    doubts: Mapping[int, str]
+    doubts: Mapping[int, str] = field(default_factory=dict)
     rms: Mapping[int, float] = field(default_factory=dict)
 
     def neighbours(self, scan: int) -> tuple[int, ...]:

@@ -1,0 +1,84 @@
+"""In words: why a pair is not used, why a scan is not placed, what speaks against a placed one."""
+
+from collections.abc import Mapping, Sequence
+
+from scanweld.config import GraphConfig
+from scanweld.geometry.arrays import FloatArray
+from scanweld.multiview.merge import Judge, is_near
+from scanweld.multiview.view_graph import Component, Edge, ViewGraph
+from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT, PairKind, PairResult
+
+
+def why_rejected(
+    result: PairResult,
+    components: Sequence[Component],
+    centres: Sequence[FloatArray],
+    near: tuple[float, float],
+) -> str:
+    """Why a pair is not used: by its own evidence, or because the rest disagrees with it."""
+    i, j = result.i, result.j
+    if result.best is None or result.kind is PairKind.NO_OVERLAP:
+        return result.reason
+    home = next((c for c in components if i in c.poses and j in c.poses), None)
+    if home is None:
+        return result.reason or "its scans could not be placed together without contradictions"
+    i_from_j = home.poses[i].inverse() @ home.poses[j]
+    apart = i_from_j.inverse() @ result.best.i_from_j
+    if not is_near(result.best.i_from_j, i_from_j, centres[j], near):
+        told = f"cycle: {apart.angle_deg():.1f} deg off what the other pairs say"
+        return f"{told}; {result.reason}" if result.reason else told
+    return result.reason or f"score {result.best.score:.2f} too low to hold"
+
+
+def why_unplaced(scan: int, pairs: Mapping[Edge, PairResult]) -> str:
+    """Why a scan is in no component: what is wrong with its best pair."""
+    options = [
+        (result.best.score, result)
+        for edge, result in sorted(pairs.items())
+        if scan in edge and result.best is not None
+    ]
+    if not options:
+        return "no pose brings it onto any other scan"
+    score, result = max(options, key=lambda option: option[0])
+    told = result.reason or "it contradicts other scans"
+    return f"no pair with another scan holds; the best one (score {score:.2f}): {told}"
+
+
+def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int, str]:
+    """What speaks against the final poses of placed scans, by scan."""
+    doubts: dict[int, str] = {}
+    for component in graph.components:
+        for k in sorted(component.poses):
+            share = _violated_share(k, component, judge)
+            if share > config.max_violated_share:
+                doubts[k] = (
+                    f"other sensors saw through its surface, or it hides theirs: {share:.0%} of "
+                    "what agrees"
+                )
+            elif not graph.neighbours(k):
+                doubts[k] = "no single pair confirms its pose"
+    for edge in _good_but_rejected(graph):
+        for k in edge:
+            doubts.setdefault(k, "a good pair disagrees with its pose")
+    return doubts
+
+
+def _violated_share(scan: int, component: Component, judge: Judge) -> float:
+    """Samples that speak against a scan's pose, as a share of those that agree."""
+    poses = component.poses
+    evidence = [judge(scan, m, poses[scan].inverse() @ poses[m]) for m in poses if m != scan]
+    agree = sum(e.agree for e in evidence)
+    weight = CONTRADICT_WEIGHT / VIOLATION_WEIGHT
+    violated = sum(e.front + weight * e.contradict for e in evidence)
+    return violated / max(agree, 1e-9)
+
+
+def _good_but_rejected(graph: ViewGraph) -> list[Edge]:
+    placed = [set(component.poses) for component in graph.components]
+    return [
+        edge
+        for edge, result in graph.pairs.items()
+        if result.kind is PairKind.GOOD
+        and edge not in graph.accepted
+        and any(set(edge) <= scans for scans in placed)
+    ]
