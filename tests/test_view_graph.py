@@ -16,7 +16,6 @@ from scanweld.config import GraphConfig
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.multiview.assemble import build_view_graph
 from scanweld.multiview.explain import find_doubts
-from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Judge
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult
