@@ -120,4 +120,4 @@ def _try_prepare(scan: RangeScan, config: Config) -> PreparedScan | str:
     try:
         return prepare(scan, config.prepare)
     except InputError as error:
-        return str(error)
+        return str(error).removeprefix(f"{scan.name}: ")
