@@ -10,6 +10,7 @@ from scanweld.prepare.range_image import make_range_image
 from scanweld.prepare.resolution import point_spacing
 from scanweld.prepare.sampling import farthest_points
 from scanweld.prepare.sensor import locate_sensor
+from scanweld.prepare.strays import without_strays
 
 MIN_SURFACE_PIXELS = 200
 MIN_SAMPLES = 50
@@ -23,10 +24,12 @@ def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
     """
     located = locate_sensor(scan)
     assert located.scan_from_sensor is not None
-    points = located.scan_from_sensor.inverse().apply(located.points)
+    sensor_from_scan = located.scan_from_sensor.inverse()
     resolution = point_spacing(located.points)
-    diameter = principal_diameter(located.points)
-    image, mesh = make_range_image(located, points, resolution, diameter, config)
+    clean = without_strays(located, sensor_from_scan.apply(located.points), resolution)
+    diameter = principal_diameter(clean.points)
+    points = sensor_from_scan.apply(clean.points)
+    image, mesh = make_range_image(clean, points, resolution, diameter, config)
     samples = take_samples(image, config)
     if len(mesh.vertices) < MIN_SURFACE_PIXELS or len(samples.points) < MIN_SAMPLES:
         raise InputError(

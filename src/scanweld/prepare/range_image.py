@@ -21,6 +21,8 @@ MAX_EDGE_PIXELS = 4.0
 POINT_PIXELS = 1.6
 NORMAL_SMOOTHING_ROUNDS = 2
 PINHOLE_ROUNDS = 2
+MIN_BETWEEN = 2
+"""Pairs of opposite neighbours on one surface that a pixel within it has; an edge has but one."""
 
 
 def make_range_image(
@@ -46,6 +48,7 @@ def make_range_image(
     if organised:
         faces = _scan_faces(scan, points, pixel, config)
         depth, _ = render_depth(points, faces, camera)
+        depth = _with_lonely(depth, points, camera, config.jump_pixels * pixel)
     else:
         depth = _splat(points, camera)
     for _ in range(PINHOLE_ROUNDS):
@@ -114,17 +117,31 @@ def _splat(points: FloatArray, camera: Camera) -> FloatArray:
     return depth
 
 
+def _with_lonely(depth: FloatArray, points: FloatArray, camera: Camera, step: float) -> FloatArray:
+    """The depth with points inside the surface that lost returns have cut off from every face."""
+    lonely = np.where(np.isfinite(depth), np.nan, _splat(points, camera))
+    _, count = _between(np.where(np.isfinite(depth), depth, lonely), step)
+    return np.where(np.isfinite(lonely) & (count >= MIN_BETWEEN), lonely, depth)
+
+
 def _fill_pinholes(depth: FloatArray, max_step: float) -> FloatArray:
-    """Fill empty pixels most of whose neighbours are one surface: lost returns, gaps of a splat."""
-    has = np.isfinite(depth)
-    box = np.ones((3, 3))
-    count = ndimage.convolve(has.astype(np.float64), box, mode="constant")
-    total = ndimage.convolve(np.where(has, depth, 0.0), box, mode="constant")
-    high = ndimage.maximum_filter(np.where(has, depth, -np.inf), size=3)
-    low = ndimage.minimum_filter(np.where(has, depth, np.inf), size=3)
-    with np.errstate(invalid="ignore"):
-        fill = ~has & (count >= 5) & (high - low <= max_step)
-    return np.where(fill, total / np.maximum(count, 1), depth)
+    """Fill empty pixels that lie within one surface: lost returns, gaps of a splat."""
+    mean, count = _between(depth, max_step)
+    return np.where(np.isnan(depth) & (count > 0), mean, depth)
+
+
+def _between(depth: FloatArray, max_step: float) -> tuple[FloatArray, FloatArray]:
+    """Of each pixel's four pairs of opposite neighbours on one surface: mean depth, number."""
+    padded = np.pad(depth, 1, constant_values=np.nan)
+    height, width = depth.shape
+    total, count = np.zeros(depth.shape), np.zeros(depth.shape)
+    for y, x in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a = padded[1 + y : 1 + y + height, 1 + x : 1 + x + width]
+        b = padded[1 - y : 1 - y + height, 1 - x : 1 - x + width]
+        is_one = np.abs(a - b) <= max_step
+        total[is_one] += 0.5 * (a + b)[is_one]
+        count += is_one
+    return total / np.maximum(count, 1), count
 
 
 def _surface(
