@@ -24,6 +24,10 @@ NUM_SECOND_LOOK = 64
 FIRST_LOOK_FLOOR = -0.35
 """Score of the first few samples below which a hypothesis is not looked at again."""
 
+MIN_SWEPT_AGREE = 0.05
+"""Share of samples that must agree: else poses that touch nothing, and so violate nothing, crowd
+out those near the right one, where a thin object violates more than it agrees."""
+
 SEARCH_FREE_WEIGHT = 1.0
 """The silhouette guides the search more than it speaks against an answer: real ones have gaps."""
 
@@ -136,16 +140,19 @@ def _score_all(
         for b in range(frames_j.shape[0]):
             for t in range(turns.shape[0]):
                 _hang(frames_i[a], frames_j[b], turns[t], pose)
-                total = 0.0
+                total, agreed = 0.0, 0
                 for s in range(num):
                     if s == NUM_FIRST_LOOK and total < 2 * NUM_FIRST_LOOK * FIRST_LOOK_FLOOR:
                         break
-                    total += weights[
-                        ask_backward(camera_j, raster_j, points_i[s], normals_i[s], pose, tolerance)
-                    ]
-                    total += weights[
-                        ask_forward(camera_i, raster_i, points_j[s], normals_j[s], pose, tolerance)
-                    ]
+                    there = ask_backward(
+                        camera_j, raster_j, points_i[s], normals_i[s], pose, tolerance
+                    )
+                    back = ask_forward(
+                        camera_i, raster_i, points_j[s], normals_j[s], pose, tolerance
+                    )
+                    total += weights[there] + weights[back]
+                    agreed += int(there == AGREE) + int(back == AGREE)
                 else:
-                    scores[a, b, t] = total / (2 * num)
+                    if agreed >= MIN_SWEPT_AGREE * 2 * num:
+                        scores[a, b, t] = total / (2 * num)
     return scores
