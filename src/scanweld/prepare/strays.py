@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.scan import RangeScan
@@ -41,5 +41,5 @@ def without_strays(scan: RangeScan, points: FloatArray, spacing: float) -> Range
 
 
 def _has_neighbours(points: FloatArray, reach: float) -> BoolArray:
-    distance, _ = cKDTree(points).query(points, k=[MIN_NEIGHBOURS + 1], distance_upper_bound=reach)
+    distance, _ = KDTree(points).query(points, k=[MIN_NEIGHBOURS + 1], distance_upper_bound=reach)
     return np.isfinite(distance[:, 0])
