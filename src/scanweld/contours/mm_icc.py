@@ -15,7 +15,8 @@ from scanweld.contours.coherence import (
 )
 from scanweld.contours.contour_sets import ObservedContours, observe_contours
 from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.pose import Pose, nearest_rotation, rotation_exp
+from scanweld.geometry.gauss_newton import damped, jacobian, motion_of, spread_of, tukey_weights
+from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.prepared import PreparedScan
 
 MIN_MATCHES = 12
@@ -30,12 +31,8 @@ NUM_OUTLINE_ROUNDS = 10
 """Renderings of the rounds across the outline."""
 OUTLINE_NOISE_PIXELS = 0.3
 """Standard deviation of an outline that is known to the pixel."""
-TUKEY = 4.685
-"""Residuals above this many standard deviations have no weight."""
 STILL_PIXELS = 0.02
 """The iteration has come to rest when a rendering moves the scan by less."""
-DAMPING = 1e-6
-"""Added to the diagonal of the normal equations, relative to its mean."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -184,12 +181,8 @@ def _outline_step(
     # A motion of i pulls at its own outlines, and the other way at the outlines of j.
     pulls = np.concatenate([forth.directions, -j_from_i.turn(back.directions)])
     centre, arm = points.mean(axis=0), j.diameter / 3
-    jacobian = np.concatenate([np.cross(points - centre, pulls) / arm, pulls], axis=1)
-    spread = max(1.4826 * float(np.median(np.abs(residuals))), OUTLINE_NOISE_PIXELS * pixel)
-    weights = (1.0 - np.minimum(np.abs(residuals) / (TUKEY * spread), 1.0) ** 2) ** 2
-    normal = (jacobian * weights[:, None]).T @ jacobian
-    normal += DAMPING * np.trace(normal) / 6 * np.eye(6)
-    twist = -np.linalg.solve(normal, jacobian.T @ (weights * residuals))
-    rotation = rotation_exp(twist[:3] / arm)
-    step = Pose(rotation=rotation, translation=centre + twist[3:] - rotation @ centre)
-    return step @ j_from_i, residuals[weights > 0] ** 2
+    by_motion = jacobian(points, pulls, centre, arm)
+    weights = tukey_weights(residuals, spread_of(residuals, OUTLINE_NOISE_PIXELS * pixel))
+    normal = damped((by_motion * weights[:, None]).T @ by_motion)
+    twist = -np.linalg.solve(normal, by_motion.T @ (weights * residuals))
+    return motion_of(twist, centre, arm) @ j_from_i, residuals[weights > 0] ** 2

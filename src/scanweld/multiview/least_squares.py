@@ -6,13 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import damped, jacobian, motion_of, spread_of, tukey_weights
 from scanweld.geometry.matches import Matches
-from scanweld.geometry.pose import Pose, rotation_exp
-
-TUKEY = 4.685
-"""Residuals above this many robust standard deviations have no weight."""
-DAMPING = 1e-6
-"""Added to the diagonal, relative to its mean: what no match holds stays where it is."""
+from scanweld.geometry.pose import Pose
 
 Found = tuple[int, int, Matches]
 """Matches of scan i on scan j, in the sensor frame of j."""
@@ -25,10 +21,10 @@ class Term:
     Attributes:
         i: The scan whose points are pulled.
         j: The scan that pulls.
-        points: (N, 3).
-        directions: (N, 3).
-        residuals: (N,).
-        weights: (N,).
+        points: (N, 3) points of i, world frame.
+        directions: (N, 3) unit directions of j, world frame.
+        residuals: (N,) signed distances along the directions, in the scans' unit.
+        weights: (N,) robust weights, not negative.
     """
 
     i: int
@@ -43,8 +39,7 @@ class Term:
 
         By a motion of j it is the negative.
         """
-        turns = np.cross(self.points - centre, self.directions) / arm
-        return np.concatenate([turns, self.directions], axis=1)
+        return jacobian(self.points, self.directions, centre, arm)
 
 
 def weighted_terms(
@@ -93,7 +88,9 @@ def move_poses(
     lengths = np.linalg.norm(twists, axis=1, keepdims=True)
     twists *= max_step / np.maximum(lengths, max_step)
     moved = {
-        k: _moved(poses[k], twist, centre, arm) for k, twist in zip(poses, twists, strict=True)
+        # A pose that is not moved keeps its very bits.
+        k: motion_of(twist, centre, arm) @ poses[k] if twist.any() else poses[k]
+        for k, twist in zip(poses, twists, strict=True)
     }
     return moved, float(np.linalg.norm(twists, axis=1).max())
 
@@ -106,44 +103,31 @@ def _normal_equations(
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for term in terms:
         a, b = place[term.i], place[term.j]
-        jacobian = term.jacobian(centre, arm)
-        weighted = jacobian * term.weights[:, None]
-        block, slope = weighted.T @ jacobian, weighted.T @ term.residuals
+        by_motion = term.jacobian(centre, arm)
+        weighted = by_motion * term.weights[:, None]
+        block, slope = weighted.T @ by_motion, weighted.T @ term.residuals
         normal[a, a] += block
         normal[b, b] += block
         normal[a, b] -= block
         normal[b, a] -= block
         gradient[a] += slope
         gradient[b] -= slope
-    normal[np.diag_indices(size)] += DAMPING * np.trace(normal) / size
-    return normal, gradient
+    return damped(normal), gradient
 
 
 def _spread(found: Sequence[Found], noise: float) -> float:
-    """Robust standard deviation of all residuals, by their median."""
-    if not found:
-        return noise
-    residuals = np.concatenate([matches.residuals for _, _, matches in found])
-    return max(1.4826 * float(np.median(np.abs(residuals))), noise)
+    return spread_of(np.concatenate([[], *(matches.residuals for _, _, matches in found)]), noise)
 
 
 def _term(
     i: int, j: int, matches: Matches, poses: Mapping[int, Pose], spread: float, share: float
 ) -> Term:
     """Matches in the world, with Tukey's biweight."""
-    ratio = np.minimum(np.abs(matches.residuals) / (TUKEY * spread), 1.0)
     return Term(
         i=i,
         j=j,
         points=poses[j].apply(matches.points),
         directions=poses[j].turn(matches.directions),
         residuals=matches.residuals,
-        weights=share * (1.0 - ratio**2) ** 2,
+        weights=share * tukey_weights(matches.residuals, spread),
     )
-
-
-def _moved(pose: Pose, twist: FloatArray, centre: FloatArray, arm: float) -> Pose:
-    if not twist.any():
-        return pose
-    rotation = rotation_exp(twist[:3] / arm)
-    return Pose(rotation=rotation, translation=centre + twist[3:] - rotation @ centre) @ pose

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
@@ -82,7 +82,7 @@ def surface_matches(i: SurfaceSource, j: SurfaceSource, j_from_i: Pose, radius: 
     return Matches(points=moved[found], directions=directions[found], residuals=residuals[found])
 
 
-def _even_by_area(areas: FloatArray, num_points: int) -> np.ndarray:
+def _even_by_area(areas: FloatArray, num_points: int) -> IntArray:
     """Indices at equal steps of the summed area."""
     if len(areas) <= num_points:
         return np.arange(len(areas))

@@ -1,0 +1,50 @@
+"""The parts of a robust Gauss-Newton step on a pose that all refinements share.
+
+A step is a twist (6,): a turn about a centre, times an arm, then a shift. With an arm of about the
+object's size both parts are lengths, so that they compare and one damping fits both.
+"""
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose, rotation_exp
+
+TUKEY = 4.685
+"""Residuals above this many robust standard deviations have no weight (95 % efficiency)."""
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of normally distributed residuals over their median magnitude."""
+DAMPING = 1e-6
+"""Added to the diagonal, relative to its mean: what no match holds stays where it is."""
+
+
+def jacobian(
+    points: FloatArray, directions: FloatArray, centre: FloatArray, arm: float
+) -> FloatArray:
+    """Change (N, 6) of the distances of points (N, 3) along directions (N, 3) by a twist."""
+    turns = np.cross(points - centre, directions) / arm
+    return np.concatenate([turns, directions], axis=1)
+
+
+def motion_of(twist: FloatArray, centre: FloatArray, arm: float) -> Pose:
+    """The motion of a twist (6,) about a centre (3,), in the frame of both."""
+    rotation = rotation_exp(twist[:3] / arm)
+    return Pose(rotation=rotation, translation=centre + twist[3:] - rotation @ centre)
+
+
+def damped(normal: FloatArray) -> FloatArray:
+    """A normal matrix (K, K) with the damping added."""
+    size = len(normal)
+    return normal + DAMPING * np.trace(normal) / size * np.eye(size)
+
+
+def spread_of(residuals: FloatArray, least: float) -> float:
+    """Robust standard deviation of residuals (N,), by their median magnitude, but no less."""
+    if not len(residuals):
+        return least
+    return max(MAD_TO_SIGMA * float(np.median(np.abs(residuals))), least)
+
+
+def tukey_weights(residuals: FloatArray, spread: float) -> FloatArray:
+    """Weights (N,) in [0, 1] of residuals (N,): Tukey's biweight."""
+    ratio = np.minimum(np.abs(residuals) / (TUKEY * spread), 1.0)
+    return (1.0 - ratio**2) ** 2
