@@ -11,7 +11,6 @@ from scanweld.geometry.pose import (
     Pose,
     nearest_rotation,
     random_rotation,
-    rotation_between,
     rotation_exp,
     rotation_log,
 )
@@ -175,20 +174,6 @@ def test_a_pose_is_finite_and_cannot_be_changed():
     assert pose.translation[0] == 0.0
     with pytest.raises(ValueError):
         pose.rotation[0, 0] = 2.0
-
-
-@given(directions(), directions())
-def test_the_rotation_between_two_directions_is_the_smallest(a: FloatArray, b: FloatArray):
-    rotation = rotation_between(a, b)
-    np.testing.assert_allclose(rotation @ a, b, atol=1e-7)
-    between = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
-    assert np.linalg.norm(rotation_log(rotation)) == pytest.approx(between, abs=1e-6)
-
-
-@given(directions())
-def test_opposite_directions_have_a_rotation_between_them(a: FloatArray):
-    np.testing.assert_allclose(rotation_between(a, -a) @ a, -a, atol=1e-7)
-    np.testing.assert_allclose(rotation_between(a, a), np.eye(3), atol=1e-12)
 
 
 @given(angles(), directions(), arrays(np.float64, (3, 3), elements=st.floats(-1e-3, 1e-3)))

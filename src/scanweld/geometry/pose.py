@@ -135,17 +135,6 @@ def rotation_log(rotation: FloatArray) -> FloatArray:
     return sign * axis * angle
 
 
-def rotation_between(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The smallest rotation that turns the unit vector a (3,) onto the unit vector b (3,)."""
-    cosine = float(a @ b)
-    if cosine < -1 + 1e-12:
-        other = np.eye(3)[int(np.argmin(np.abs(a)))]
-        axis = np.cross(a, other).astype(np.float64)
-        return rotation_exp(np.pi * axis / np.linalg.norm(axis))
-    k = _cross(np.cross(a, b))
-    return nearest_rotation(np.eye(3) + k + k @ k / (1 + cosine))
-
-
 def random_rotation(rng: np.random.Generator) -> FloatArray:
     """A rotation drawn evenly from SO(3), by a random unit quaternion."""
     w, x, y, z = (q := rng.normal(size=4)) / np.linalg.norm(q)

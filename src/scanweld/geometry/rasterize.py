@@ -30,11 +30,12 @@ def render_depth(
     # 1/z is linear in a pinhole's image, z in an orthographic one.
     is_pinhole = camera.model is CameraModel.PINHOLE
     with np.errstate(divide="ignore"):
-        linear = 1.0 / depth if is_pinhole else depth
+        linear = 1.0 / depth if is_pinhole else np.array(depth)
     image = np.full((camera.height, camera.width), np.nan)
     face_of = np.full((camera.height, camera.width), -1, dtype=np.int64)
-    triangles = np.ascontiguousarray(faces)
-    _fill(np.ascontiguousarray(pixels), linear, triangles, is_pinhole, image, face_of)
+    # Copies are contiguous and writable, whatever came in: the kernel is compiled for one kind.
+    pixels, triangles = np.array(pixels, order="C"), np.array(faces, order="C")
+    _fill(pixels, linear, triangles, is_pinhole, image, face_of)
     return (1.0 / image if is_pinhole else image), face_of
 
 
@@ -47,6 +48,7 @@ def _fill(
     image: FloatArray,
     face_of: IntArray,
 ) -> None:
+    """Write the nearest triangle of each pixel into image and face_of; values linear in it."""
     height, width = image.shape
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
