@@ -11,8 +11,8 @@ from scanweld.errors import WriteError
 
 logger = logging.getLogger(__name__)
 
-# Protocol 5 brings frozen arrays back read-only; a kernel would be compiled anew for writable ones.
 _PROTOCOL = 5
+"""Brings frozen arrays back read-only; a kernel would be compiled anew for writable ones."""
 _DIGEST_SIZE = hashlib.sha256().digest_size
 _STALE = (pickle.UnpicklingError, AttributeError, ImportError, TypeError)
 

@@ -10,10 +10,10 @@ from scanweld.geometry.camera import Camera
 from scanweld.heat.back import coarse_faces
 from scanweld.heat.front import FrontMesh, pieces
 
-# The back plane lies this far behind the deepest point.
 _BACK_DIAMETERS = 0.05
-# Rows of wall vertices between the front's border and the back plane, as shares of the way.
+"""The back plane lies this far behind the deepest point."""
 _WALL_ROWS = (0.15, 0.5)
+"""Rows of wall vertices between the front's border and the back plane, as shares of the way."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -5,8 +5,8 @@ import numpy as np
 from scanweld.geometry.arrays import BoolArray, IntArray
 from scanweld.heat.front import FrontMesh
 
-# The largest squares, in cells of the front.
 _LARGEST = 8
+"""The largest squares, in cells of the front."""
 
 
 def coarse_faces(front: FrontMesh, border: IntArray) -> IntArray:

@@ -16,10 +16,10 @@ from scanweld.heat.keypoints import group, persistent_maxima
 from scanweld.heat.laplacian import eigenpairs
 from scanweld.heat.signature import diffusion_times, heat_signature
 
-# A front of fewer vertices than this many times the modes does not resolve them.
 _VERTICES_PER_MODE = 2
-# Keypoints need a normal to be trusted: farther from grazing incidence than this.
+"""A front of fewer vertices than this many times the modes does not resolve them."""
 _MIN_COSINE = 0.15
+"""Keypoints need a normal to be trusted: farther from grazing incidence than this."""
 
 logger = logging.getLogger(__name__)
 

@@ -10,12 +10,12 @@ from scipy.sparse.csgraph import connected_components
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from scanweld.geometry.prepared import RangeImage
 
-# Depth step between neighbouring pixels, in footprints, that cuts the surface.
 _JUMP_PIXELS = 6.0
-# Pieces smaller than this share of the front's vertices tell nothing and cost modes.
+"""Depth step between neighbouring pixels, in footprints, that cuts the surface."""
 _SMALLEST_PIECE = 0.01
-# A hole of so many pixels across is a dropout: the surface goes on beneath it.
+"""Pieces smaller than this share of the front's vertices tell nothing and cost modes."""
 _DROPOUT_PIXELS = 2
+"""A hole of so many pixels across is a dropout: the surface goes on beneath it."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -8,10 +8,10 @@ from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
-# A maximum must be found again at so many successive times.
 _MIN_TIMES = 2
-# Signatures (log) are alike below this root mean square difference.
+"""A maximum must be found again at so many successive times."""
 _ALIKE = 0.5
+"""Signatures (log) are alike below this root mean square difference."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

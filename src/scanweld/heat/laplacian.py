@@ -7,8 +7,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from scanweld.geometry.arrays import FloatArray, IntArray
 
-# Shift of the spectrum, for a mesh of unit size: makes the operator definite.
 _SHIFT = 1.0
+"""Shift of the spectrum, for a mesh of unit size: makes the operator definite."""
 _START_SEED = 20
 
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 
-# Eigenvalues below this, for a mesh of unit size, belong to functions constant on each piece.
 _CONSTANT = 1e-6
-# Less heat than this is none: a piece too small to have a mode would show rounding errors.
+"""Eigenvalues below this, for a mesh of unit size, belong to functions constant on each piece."""
 _LEAST_HEAT = 1e-9
+"""Less heat than this is none: a piece too small to have a mode would show rounding errors."""
 
 
 def diffusion_times(eigenvalues: FloatArray, num_times: int, longest: float) -> FloatArray:

@@ -13,8 +13,8 @@ from scanweld.io.read import READERS
 
 logger = logging.getLogger(__name__)
 
-# Found in a folder these are more often a README or a table than a scan: they must be named.
 _ONLY_WHEN_NAMED = frozenset({".txt", ".csv"})
+"""Found in a folder these are more often a README or a table than a scan: they must be named."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -26,8 +26,8 @@ _COLORS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
 )
-# Above this a double, as which the numbers of ASCII files are read, is not exact.
 _LARGEST_INDEX = 2**53
+"""Above this a double, as which the numbers of ASCII files are read, is not exact."""
 _INDEX_LISTS = ("vertex_indices", "vertex_index")
 
 

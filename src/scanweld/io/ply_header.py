@@ -9,13 +9,13 @@ from scanweld.errors import ReadError
 
 logger = logging.getLogger(__name__)
 
-# Both spellings of every scalar type -> NumPy's code without the byte order.
 SCALAR_TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
     **{"int64": "i8", "uint64": "u8", "float": "f4", "double": "f8"},
     **{"float32": "f4", "float64": "f8"},
 }
+"""Both spellings of every scalar type -> NumPy's code without the byte order."""
 _FIRST_LINE = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
 FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 

@@ -8,8 +8,8 @@ import numpy as np
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 
-# How some C libraries print what is not a number: nan(ind), -1.#IND00.
 _NOT_A_NUMBER = re.compile(rb"[+-]?(nan(\(\w*\))?|1\.?#(qnan|snan|ind)\d*)", re.IGNORECASE)
+"""How some C libraries print what is not a number: nan(ind), -1.#IND00."""
 
 
 def parse_numbers(path: Path, text: bytes, first_line: int = 1) -> FloatArray:

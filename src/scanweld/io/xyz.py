@@ -15,8 +15,8 @@ logger = logging.getLogger(__name__)
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _SEPARATORS = bytes.maketrans(b",;", b"  ")
-# Not inside a word: some libraries print NaN as 1.#QNAN.
 _COMMENT = re.compile(rb"(^|\s)(#|//).*$", re.DOTALL)
+"""Not inside a word: some libraries print NaN as 1.#QNAN."""
 _WIDTHS = (3, 4, 6, 7)
 
 
