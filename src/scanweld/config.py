@@ -71,7 +71,10 @@ class PairsConfig(Section):
     """Distinct poses that are kept for a pair."""
     min_score: float = Field(default=0.10, ge=0, le=1)
     """Score below which a pair is not accepted on its own."""
-    min_margin: float = Field(default=0.2, ge=0, le=1)
+    max_violated_share: float = Field(default=0.5, ge=0)
+    """Samples that the other sensor contradicts, as a share of those that agree, above which a
+    pair is not accepted on its own: wrong poses often agree widely, but not cleanly."""
+    min_margin: float = Field(default=0.4, ge=0, le=1)
     """Share of the score by which the best pose must beat its best distinct rival."""
     min_observability: float = Field(default=5e-4, ge=0)
     """Smallest over largest eigenvalue of the information matrix below which a pose slides."""

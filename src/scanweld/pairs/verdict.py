@@ -54,10 +54,11 @@ def _kind(
     if not alternatives or alternatives[0].evidence.agree < MIN_AGREE:
         return PairKind.NO_OVERLAP, "no pose makes the scans overlap"
     best = alternatives[0]
+    if best.evidence.violation > config.max_violated_share * best.evidence.agree:
+        told = f"{best.evidence.violation:.2f} violated, {best.evidence.agree:.2f} agreed"
+        return PairKind.CONTRADICTED, f"each sensor saw through the other's surface: {told}"
     if best.score < config.min_score:
         told = f"score {best.score:.2f} below {config.min_score:.2f}"
-        if best.evidence.violation > 0.5 * best.evidence.agree:
-            return PairKind.CONTRADICTED, f"each sensor saw through the other's surface: {told}"
         return PairKind.NO_OVERLAP, f"too little overlap to be sure: {told}"
     if observability < config.min_observability:
         return (
