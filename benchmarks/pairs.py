@@ -23,6 +23,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from scanweld.config import Config, PairsConfig
+from scanweld.contours.coherence import contour_matcher
 from scanweld.evaluation.metrics import (
     MAX_ROTATION_DEG,
     MAX_TRANSLATION_PERCENT,
@@ -164,9 +165,10 @@ def _lay_out(data: Path, names: tuple[str, ...], seed: int, config: Config, work
     features = [None] * len(prepared)
     if config.pairs.keypoints != "even":
         features = list(map_in_order(lambda scan: describe(scan, config.heat), prepared, workers))
+    contours = contour_matcher(prepared, config.contours)
     return _Scene(
         prepared=dict(zip(names, prepared, strict=True)),
-        register=pair_registrar(prepared, features, fields, diameter, config),
+        register=pair_registrar(prepared, features, fields, contours, diameter, config),
         reference=reference,
         object_diameter=object_diameter(moved, reference),
     )

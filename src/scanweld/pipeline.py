@@ -5,8 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-
 from scanweld.config import Config
 from scanweld.contours.coherence import contour_matcher
 from scanweld.errors import InputError
@@ -20,8 +18,9 @@ from scanweld.intake import Intake, take_in
 from scanweld.multiview.assemble import build_view_graph
 from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Judge
-from scanweld.multiview.refine import refine_poses, scan_rms
-from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.multiview.refine import ContourMatcher, refine_poses
+from scanweld.multiview.refine_graph import refine_graph
+from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.outcome import conclude
 from scanweld.pairs.anchors import pair_anchors
 from scanweld.pairs.field import ScanField, make_field
@@ -36,7 +35,9 @@ from scanweld.stages import Stages, work_key
 logger = logging.getLogger(__name__)
 
 NUM_JUDGED_SAMPLES = 300
+"""Samples of a scan that judge merges and refinements: thousands of poses are asked about."""
 NUM_SETTLING_ROUNDS = 3
+"""Rounds of refinement of a component that grows, so that chains of pairs do not drift."""
 
 
 def run(
@@ -69,45 +70,52 @@ def run(
     stages = Stages(workers=num_workers(workers), cache=cache or NoCache(), progress=progress)
     with single_threaded_algebra():
         intake = take_in(scans, unreadable or {}, config, stages)
-        prepared, diameter = intake.prepared, intake.diameter
-        features = _describe(prepared, config, stages)
-        fields = stages.each("lay out", lambda scan: make_field(scan, diameter), prepared)
-        pairs = _register_pairs(intake, features, fields, config, stages)
+        features = _describe(intake, config, stages)
+        fields = _lay_out(intake, stages)
+        contours = contour_matcher(intake.prepared, config.contours)
+        pairs = _register_pairs(intake, features, fields, contours, config, stages)
         graph = _build_graph(intake, fields, pairs, config, stages)
-        graph = _refine(intake, fields, graph, config, stages)
-        mesh = _fuse(prepared, graph, config, stages)
+        graph = _refine(intake, fields, contours, graph, config, stages)
+        mesh = _fuse(intake, graph, config, stages)
         return conclude(intake, features, fields, graph, mesh, config, stages.reports)
 
 
-def _describe(
-    prepared: Sequence[PreparedScan], config: Config, stages: Stages
-) -> list[Features | None]:
+def _describe(intake: Intake, config: Config, stages: Stages) -> list[Features | None]:
     """PA-HKS keypoints of every scan (paper 3.1), unless the settings do without."""
     if config.pairs.keypoints == "even":
-        return [None] * len(prepared)
+        return [None] * len(intake.prepared)
     with stages.stage("features") as counts:
         found = stages.each(
             "features",
             lambda scan: describe(scan, config.heat),
-            prepared,
+            intake.prepared,
             lambda scan: work_key("features", scan.content_hash, config.prepare, config.heat),
         )
         counts["keypoints"] = sum(len(f.points) for f in found)
     return list(found)
 
 
+def _lay_out(intake: Intake, stages: Stages) -> list[ScanField]:
+    """Every scan as the arrays that the pairs' kernels take."""
+    with stages.stage("lay out"):
+        return stages.each(
+            "lay out", lambda scan: make_field(scan, intake.diameter), intake.prepared
+        )
+
+
 def _register_pairs(
     intake: Intake,
     features: Sequence[Features | None],
     fields: Sequence[ScanField],
+    contours: ContourMatcher,
     config: Config,
     stages: Stages,
-) -> dict[tuple[int, int], PairResult]:
-    """Judge every pair of scans from any start pose."""
+) -> dict[Edge, PairResult]:
+    """Register every pair of scans from any start pose, and judge what two scans alone say."""
     edges = list(combinations(range(len(fields)), 2))
-    register = pair_registrar(intake.prepared, features, fields, intake.diameter, config)
+    register = pair_registrar(intake.prepared, features, fields, contours, intake.diameter, config)
 
-    def key(edge: tuple[int, int]) -> str:
+    def key(edge: Edge) -> str:
         hashes = [intake.prepared[k].content_hash for k in edge]
         settings = (config.prepare, config.heat, config.pairs, config.contours, config.refine)
         return work_key("pair", *hashes, intake.diameter, *settings)
@@ -125,22 +133,31 @@ def pair_registrar(
     prepared: Sequence[PreparedScan],
     features: Sequence[Features | None],
     fields: Sequence[ScanField],
+    contours: ContourMatcher,
     diameter: float,
     config: Config,
-) -> Callable[[tuple[int, int]], PairResult]:
-    """What registers a pair (i, j), i < j, of the given scans: search, then MM-ICC's contours."""
+) -> Callable[[Edge], PairResult]:
+    """What registers a pair (i, j), i < j, of the given scans: the search, then its best refined.
+
+    Args:
+        prepared: All scans.
+        features: Their PA-HKS keypoints, or None.
+        fields: The scans laid out for the search.
+        contours: Finds contour matches of two scans.
+        diameter: Diameter of the run, in the scans' unit.
+        config: Settings.
+    """
     anchors = [
         pair_anchors(field, found, diameter, config.pairs)
         for field, found in zip(fields, features, strict=True)
     ]
-    match_contours = contour_matcher(prepared, config.contours)
 
-    def register(edge: tuple[int, int]) -> PairResult:
+    def register(edge: Edge) -> PairResult:
         i, j = edge
 
         def polish(i_from_j: Pose) -> Pose:
             start = {i: Pose.identity(), j: i_from_j}
-            refined = refine_poses(prepared, start, [edge], config.refine, match_contours).poses
+            refined = refine_poses(prepared, start, [edge], config.refine, contours).poses
             return refined[i].inverse() @ refined[j]
 
         both = list(zip(anchors[i], anchors[j], strict=True))
@@ -152,7 +169,7 @@ def pair_registrar(
 def _build_graph(
     intake: Intake,
     fields: Sequence[ScanField],
-    pairs: Mapping[tuple[int, int], PairResult],
+    pairs: Mapping[Edge, PairResult],
     config: Config,
     stages: Stages,
 ) -> ViewGraph:
@@ -189,58 +206,36 @@ def make_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> 
 
 
 def _refine(
-    intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config, stages: Stages
+    intake: Intake,
+    fields: Sequence[ScanField],
+    contours: ContourMatcher,
+    graph: ViewGraph,
+    config: Config,
+    stages: Stages,
 ) -> ViewGraph:
-    """Refine each component's poses together (paper 3.2); the evidence must not suffer."""
+    """Refine each component's poses together (paper 3.2), and doubt what comes out."""
     judge_pair = make_judge(fields, intake.diameter, config)
-    contours = contour_matcher(intake.prepared, config.contours)
-
-    rms: dict[int, float] = {}
-
-    def refine(component: Component) -> Component:
-        edges = [edge for edge in graph.accepted if edge[0] in component.poses]
-        start = dict(component.poses)
-        refined = refine_poses(intake.prepared, start, edges, config.refine, contours)
-        if _support(refined.poses, edges, judge_pair) < _support(start, edges, judge_pair) - 0.01:
-            logger.warning("the joint refinement made the evidence worse and is left out")
-            return component
-        rms.update(scan_rms(refined))
-        to_reference = refined.poses[component.reference].inverse()
-        return replace(
-            component, poses={k: to_reference @ pose for k, pose in refined.poses.items()}
-        )
-
     with stages.stage("refine") as counts:
-        components = tuple(refine(component) for component in graph.components)
-        graph = replace(graph, components=components, rms=rms)
+        graph = refine_graph(graph, intake.prepared, contours, judge_pair, config.refine)
         graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
-        counts["scans"] = sum(len(component.poses) for component in components)
+        counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     return graph
 
 
-def _support(
-    poses: Mapping[int, Pose], edges: Sequence[tuple[int, int]], judge_pair: Judge
-) -> float:
-    """Mean score of the accepted pairs at the given poses."""
-    scores = [judge_pair(i, j, poses[i].inverse() @ poses[j]).score for i, j in edges]
-    return float(np.mean(scores)) if scores else 0.0
-
-
-def _fuse(
-    prepared: Sequence[PreparedScan], graph: ViewGraph, config: Config, stages: Stages
-) -> TriangleMesh | None:
-    """The surface of the largest component, in the scan frame of its reference."""
+def _fuse(intake: Intake, graph: ViewGraph, config: Config, stages: Stages) -> TriangleMesh | None:
+    """The surface of the largest component, in the scan frame of its reference; None without."""
     if not graph.components:
         return None
     component = graph.components[0]
     order = sorted(component.poses)
-    reference = prepared[component.reference].scan_from_sensor
+    prepared = intake.prepared
+    world_from_reference = prepared[component.reference].scan_from_sensor
     with stages.stage("fuse") as counts:
         try:
             mesh = fuse(
                 [prepared[k] for k in order],
-                [reference @ component.poses[k] for k in order],
+                [world_from_reference @ component.poses[k] for k in order],
                 config.fusion,
             )
         except InputError as error:

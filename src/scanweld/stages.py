@@ -63,11 +63,12 @@ class Stages:
         def finished(item: Item) -> Result:
             if key is None:
                 return function(item)
-            kept = self.cache.get(key(item))
+            name_of_work = key(item)
+            kept = self.cache.get(name_of_work)
             if kept is not None:
                 return kept  # type: ignore[return-value]  # what put() kept under the same key
             result = function(item)
-            self.cache.put(key(item), result)
+            self.cache.put(name_of_work, result)
             return result
 
         results = []

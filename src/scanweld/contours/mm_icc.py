@@ -184,5 +184,5 @@ def _outline_step(
     by_motion = jacobian(points, pulls, centre, arm)
     weights = tukey_weights(residuals, spread_of(residuals, OUTLINE_NOISE_PIXELS * pixel))
     normal = damped((by_motion * weights[:, None]).T @ by_motion)
-    twist = -np.linalg.solve(normal, by_motion.T @ (weights * residuals))
+    twist = -np.linalg.solve(normal, by_motion.T @ (weights * residuals)).astype(np.float64)
     return motion_of(twist, centre, arm) @ j_from_i, residuals[weights > 0] ** 2
