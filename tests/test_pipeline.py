@@ -225,6 +225,17 @@ def test_of_objects_that_slide_nothing_is_asserted(name: str):
     assert len(result.unplaced) == 3
 
 
+def test_a_model_that_cannot_be_fused_is_not_passed_over(monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_: object) -> None:
+        raise InputError("no surface")
+
+    monkeypatch.setattr(pipeline, "fuse", refuse)
+    result = run(few()[:2])
+    assert len(result.poses) == 2 and result.mesh is None
+    assert result.verdict is Verdict.PARTIAL
+    assert result.reasons == ("the placed scans could not be fused into a model",)
+
+
 def test_a_scan_in_another_unit_is_named():
     scans = list(few()[:3])
     scans[2] = replace(scaled(scans[2], 0.001), name="in_metres")

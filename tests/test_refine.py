@@ -12,7 +12,10 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.multiview.refine import Refinement, refine_poses
+from scanweld.multiview.refine_graph import refine_graph
 from scanweld.multiview.surface_terms import surface_matches, surface_source
+from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.pairs.result import Alternative, Evidence
 from scanweld.prepare import prepare
 from tests.prepared import scaled
 from tests.scenes import creature_scene
@@ -186,3 +189,45 @@ def test_back_sides_do_not_match():
     turned = Pose(rotation=flip.rotation, translation=middle - flip.rotation @ middle)
     assert not len(surface_matches(source, source, turned, 1e-3 * scans[0].diameter))
     assert len(surface_matches(source, source, Pose.identity(), 1e-3 * scans[0].diameter)) > 1000
+
+
+def graph_at(poses: Mapping[int, Pose]) -> ViewGraph:
+    """One component of all scans, neighbours joined."""
+    to_reference = poses[1].inverse()
+    component = Component(poses={k: to_reference @ pose for k, pose in poses.items()}, reference=1)
+    accepted = {
+        (min(edge), max(edge)): Alternative(
+            i_from_j=Pose.identity(), evidence=evidence(agree=1.0), overlap=1.0
+        )
+        for edge in RING
+    }
+    return ViewGraph(pairs={}, accepted=accepted, rejected={}, components=(component,), unplaced={})
+
+
+def evidence(agree: float) -> Evidence:
+    return Evidence(
+        agree=agree, front=0.0, contradict=0.0, free=0.0, occluded=1.0 - agree, unknown=0.0
+    )
+
+
+@pytest.mark.parametrize("is_better", [True, False])
+def test_a_refinement_is_taken_only_if_the_evidence_does_not_suffer(is_better: bool):
+    scans, truth = ring()
+    graph = graph_at(start(1.0, 0.005))
+    before = graph.components[0].poses
+
+    def judge(i: int, j: int, i_from_j: Pose) -> Evidence:
+        is_start = (before[i].inverse() @ before[j]).inverse() @ i_from_j
+        return evidence(0.5 if (is_start.angle_deg() < 1e-9) == is_better else 0.6)
+
+    matcher = contour_matcher(scans, ContoursConfig())
+    refined = refine_graph(graph, scans, matcher, judge, RefineConfig())
+    poses = refined.components[0].poses
+    np.testing.assert_allclose(poses[1].matrix(), np.eye(4), atol=1e-12)
+    if not is_better:
+        assert poses == before and not refined.rms
+        return
+    to_truth = truth[1].inverse()
+    for k, pose in truth.items():
+        assert ((to_truth @ pose).inverse() @ poses[k]).angle_deg() < 0.1
+    assert set(refined.rms) == set(truth)

@@ -46,7 +46,7 @@ def conclude(
         scans[scan.name] = _scan_report(
             k, intake, fields, graph, 0 if found is None else len(found.points), config
         )
-    verdict, reasons = _verdict(graph, scans)
+    verdict, reasons = _verdict(graph, scans, mesh)
     return Reconstruction(
         poses=_poses(prepared, graph),
         components=tuple(
@@ -205,7 +205,9 @@ def _overlap_share(evidence: Evidence) -> float:
     return evidence.agree + evidence.contradict
 
 
-def _verdict(graph: ViewGraph, scans: Mapping[str, ScanReport]) -> tuple[Verdict, tuple[str, ...]]:
+def _verdict(
+    graph: ViewGraph, scans: Mapping[str, ScanReport], mesh: TriangleMesh | None
+) -> tuple[Verdict, tuple[str, ...]]:
     if not graph.components:
         return Verdict.NOTHING, ("no two scans could be registered to each other",)
     by_verdict = {
@@ -220,6 +222,8 @@ def _verdict(graph: ViewGraph, scans: Mapping[str, ScanReport]) -> tuple[Verdict
     if len(graph.components) > 1:
         sizes = ", ".join(str(len(component.poses)) for component in graph.components)
         reasons.append(f"the scans fall into {len(graph.components)} components of {sizes} scans")
+    if mesh is None:
+        reasons.append("the placed scans could not be fused into a model")
     if by_verdict[ScanVerdict.DOUBTFUL]:
         return Verdict.DOUBTFUL, tuple(reasons)
     return (Verdict.PARTIAL if reasons else Verdict.GOOD), tuple(reasons)

@@ -73,7 +73,7 @@ class ScanReport:
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class AlternativeReport:
-    """A distinct pose of a pair (scan frames) and its score."""
+    """A distinct pose of a pair (scan frames, in the scans' unit) and its score."""
 
     i_from_j: Pose
     score: float
@@ -91,8 +91,8 @@ class PairReport:
         reason: Why not, or a remark; may be empty.
         i_from_j: The accepted pose, else the best found; None where nothing fits at all.
         score: Its score; None where nothing fits.
-        overlap: Share of the scans' samples that agree, of those that could.
-        evidence: Its evidence.
+        overlap: Share of the scans' samples that lie on the other's surface; 0 where nothing fits.
+        evidence: Its evidence; None where nothing fits.
         margin: Share of the score by which it beats the best distinct rival.
         observability: Smallest over largest eigenvalue of its information.
         alternatives: All distinct poses kept, best first.
@@ -138,7 +138,8 @@ class Reconstruction:
         unplaced: Reason for every scan that has no pose.
         scans: Report of every scan.
         pairs: Report of every pair, ordered by names.
-        mesh: Fused surface of the largest component; None if nothing was placed.
+        mesh: Fused surface of the largest component, in its frame; None if nothing was placed, or
+            what was placed could not be fused.
         verdict: The whole in one word.
         reasons: Why it is not good, in sentences.
         stages: Time and memory per stage, in the order of the run.
