@@ -81,7 +81,8 @@ def _triangles(case: int) -> list[Triangle]:
     triangles: list[Triangle] = []
     for loop in _loops(case):
         split = _split(loop)
-        assert split is not None
+        if split is None:
+            raise AssertionError("unreachable: every loop of a cell's cases can be split")
         triangles += split
     return triangles
 

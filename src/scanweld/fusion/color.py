@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import KDTree
 
-from scanweld.fusion.posed_image import PosedImage
+from scanweld.fusion.posed_image import PosedImage, look_up
 from scanweld.geometry.arrays import ByteArray, FloatArray
-from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 
 _NUM_NEIGHBOURS = 3
@@ -40,7 +39,9 @@ def blend_colors(
     for scan, image in zip(scans, images, strict=True):
         if scan.scan.colors is None:
             continue
-        color, share = _colors_of(scan, image.sensor_from_world.inverse(), vertices, reach)
+        world_from_scan = (scan.scan_from_sensor @ image.sensor_from_world).inverse()
+        points = world_from_scan.apply(scan.scan.points)
+        color, share = _nearest_colors(points, scan.scan.colors, vertices, reach)
         share *= _weights_of(image, vertices, normals)
         total += share[:, None] * color
         weight += share
@@ -53,32 +54,24 @@ def blend_colors(
     return np.clip(np.rint(color), 0, 255).astype(np.uint8)
 
 
-def _colors_of(
-    scan: PreparedScan, world_from_sensor: Pose, vertices: FloatArray, reach: float
+def _nearest_colors(
+    points: FloatArray, colors: ByteArray, vertices: FloatArray, reach: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Colours (V, 3) of a scan's points nearest to vertices, and 1 where there are any, else 0."""
-    assert scan.scan.colors is not None and scan.scan.scan_from_sensor is not None
-    world_from_scan = world_from_sensor @ scan.scan.scan_from_sensor.inverse()
-    tree = KDTree(world_from_scan.apply(scan.scan.points))
+    """Colours (V, 3) of the points nearest to vertices, and 1 where there are any, else 0."""
+    tree = KDTree(points)
     distance, index = tree.query(vertices, k=_NUM_NEIGHBOURS, distance_upper_bound=reach)
     near = np.isfinite(distance)
     share = np.where(near, 1.0 / (np.where(near, distance, 0.0) + 0.1 * reach), 0.0)
-    colors = scan.scan.colors[np.where(near, index, 0)].astype(np.float64)
+    nearest = colors[np.where(near, index, 0)].astype(np.float64)
     total = share.sum(axis=1)
-    blended = np.einsum("vk,vkc->vc", share, colors) / np.where(total > 0, total, 1.0)[:, None]
+    blended = np.einsum("vk,vkc->vc", share, nearest) / np.where(total > 0, total, 1.0)[:, None]
     return blended, (total > 0).astype(np.float64)
 
 
 def _weights_of(image: PosedImage, vertices: FloatArray, normals: FloatArray) -> FloatArray:
     """Weights (V,) of an image's pixels at vertices, times the cosine of their own incidence."""
     seen = image.sensor_from_world.apply(vertices)
-    pixels, _ = image.camera.project(seen)
-    index = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(np.int64)
-    column, row = index[:, 0], index[:, 1]
-    height, width = image.weight.shape
-    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    weight = np.zeros(len(vertices))
-    weight[inside] = image.weight[row[inside], column[inside]]
+    weight = look_up(image.weight, image.camera, seen)
     rays = image.camera.view_directions(seen)
     cosine = -np.einsum("vk,vk->v", image.sensor_from_world.turn(normals), rays)
     return weight * np.maximum(cosine, 0.0)

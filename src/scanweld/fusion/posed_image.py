@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
@@ -78,20 +79,22 @@ def free_space_trusts(images: Sequence[PosedImage], free: Sequence[BoolArray]) -
     points = [_sparse(image) for image in images]
     trusts = np.ones(len(images))
     for j, (image, is_free) in enumerate(zip(images, free, strict=True)):
-        lost = [_look_up(is_free, image, p).mean() for p in points if len(p)]
+        seen = [image.sensor_from_world.apply(p) for p in points if len(p)]
+        lost = [look_up(is_free, image.camera, p).mean() for p in seen]
         trusts[j] = max(0.0, 1.0 - max(lost, default=0.0) / _MAX_LOST)
     logger.debug("trust in free space: %s", np.round(trusts, 2))
     return trusts
 
 
-def _look_up(mask: BoolArray, image: PosedImage, points: FloatArray) -> BoolArray:
-    """The mask's value (P,) where points (P, 3) project into the image; False outside of it."""
-    pixels, _ = image.camera.project(image.sensor_from_world.apply(points))
+def look_up(values: NDArray, camera: Camera, points: FloatArray) -> NDArray:
+    """The values (P,) of pixels (H, W) where points (P, 3), sensor frame, project; 0 outside."""
+    pixels, _ = camera.project(points)
     column, row = np.rint(np.nan_to_num(pixels, nan=-1.0)).astype(np.int64).T
-    inside = (row >= 0) & (row < mask.shape[0]) & (column >= 0) & (column < mask.shape[1])
-    values = np.zeros(len(points), dtype=bool)
-    values[inside] = mask[row[inside], column[inside]]
-    return values
+    height, width = values.shape
+    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    found = np.zeros(len(points), dtype=values.dtype)
+    found[inside] = values[row[inside], column[inside]]
+    return found
 
 
 def _sparse(image: PosedImage) -> FloatArray:
