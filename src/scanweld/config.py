@@ -6,7 +6,7 @@ point spacing, ``*_pixels`` of a range image's footprint on the object, ``*_deg`
 
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -14,12 +14,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scanweld.errors import ConfigError
 
 Unit = Literal["m", "cm", "mm", "in"]
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1)]
 
 
 class Section(BaseModel):
     """A frozen group of settings; unknown keys are errors."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class PrepareConfig(Section):
@@ -34,9 +36,9 @@ class PrepareConfig(Section):
     rim_pixels: int = Field(default=2, ge=1)
     """Width of the rim along jumps, holes and the silhouette."""
     min_cosine: float = Field(default=0.15, ge=0, lt=1)
-    """Samples whose normal is farther from the viewing direction than this are left out."""
+    """Cosine between normal and viewing ray below which a place is too oblique for a sample."""
     num_samples: int = Field(default=800, ge=100)
-    """Oriented samples of a scan."""
+    """Oriented samples of a scan, at most."""
 
 
 class HeatConfig(Section):
@@ -58,22 +60,22 @@ class PairsConfig(Section):
     """Pair registration from any start pose."""
 
     keypoints: Literal["mixed", "heat", "even"] = "mixed"
-    """What anchors the hypotheses: PA-HKS keypoints, evenly spread points, or both."""
+    """What anchors the hypotheses: PA-HKS keypoints ("heat"), evenly spread points, or both."""
     anchor_diameters: float = Field(default=0.07, gt=0)
     """Spacing of evenly spread anchors."""
     num_turns: int = Field(default=24, ge=8)
     """Turns about the normal that are tried for each pair of anchors."""
-    tolerance_diameters: tuple[float, float, float] = (0.04, 0.02, 0.012)
+    tolerance_diameters: tuple[Positive, Positive, Positive] = (0.04, 0.02, 0.012)
     """Depth tolerance of the evidence, coarse to fine."""
-    num_survivors: tuple[int, int] = (300, 30)
+    num_survivors: tuple[Count, Count] = (300, 30)
     """Hypotheses that go on to the first and to the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
     """Distinct poses that are kept for a pair."""
     min_score: float = Field(default=0.10, ge=0, le=1)
     """Score below which a pair is not accepted on its own."""
     max_violated_share: float = Field(default=0.5, ge=0)
-    """Samples that the other sensor contradicts, as a share of those that agree, above which a
-    pair is not accepted on its own: wrong poses often agree widely, but not cleanly."""
+    """Samples that the other sensor contradicts in any way, as a share of those that agree, above
+    which a pair is not accepted on its own: wrong poses often agree widely, but not cleanly."""
     min_margin: float = Field(default=0.4, ge=0, le=1)
     """Share of the score by which the best pose must beat its best distinct rival."""
     min_observability: float = Field(default=5e-4, ge=0)
@@ -86,26 +88,33 @@ class GraphConfig(Section):
     max_cycle_deg: float = Field(default=5.0, gt=0)
     """Closing error above which a cycle of pairs contradicts itself."""
     max_cycle_diameters: float = Field(default=0.03, gt=0)
-    """The same for the shift."""
+    """The same for the shift of the middle of a scan."""
     min_edge_score: float = Field(default=-0.05, ge=-1, le=1)
     """Score below which a pair is not called accepted even where it agrees with the poses."""
     min_mutual_score: float = Field(default=0.15, ge=0)
-    """Score of a merge that rests on several weak pairs that propose the same motion."""
+    """Least score of a merge that rests on several weak pairs that propose the same motion."""
     max_mutual_violated_share: float = Field(default=0.1, ge=0)
-    """Samples that the other sensors contradict in such a merge, as a share of those that agree."""
+    """Most samples that the other sensors contradict in such a merge, as a share of those that
+    agree."""
     min_margin: float = Field(default=0.2, ge=0, le=1)
     """Share of its score by which a merge must beat the best distinct one."""
     max_violated_share: float = Field(default=0.15, ge=0)
-    """Samples that the other sensors contradict, as a share of those that agree."""
+    """Samples that the other sensors contradict, as a share of those that agree, above which a
+    merge is refused and a placed scan is doubtful."""
     max_violation: float = Field(default=0.03, ge=0)
-    """Share of samples by which violation may exceed half the agreement in any implied pair."""
+    """Share of samples by which violation may exceed half the agreement in any pair across a
+    merge."""
 
 
 class ContoursConfig(Section):
-    """MM-ICC (paper 3.2)."""
+    """MM-ICC (paper 3.2).
+
+    A run takes its contour sets and prunings into the joint refinement; ``trim`` and what follows
+    are for two scans aligned by contours alone (``contours.mm_icc.refine_pair``).
+    """
 
     jump_pixels: float = Field(default=5.0, gt=1)
-    """Thresholds tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
+    """Depth steps tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
     trim: float | None = Field(default=None, gt=0, le=1)
     """Share of the contour matches that trimmed ICP keeps; found anew in each step if None."""
     num_renders: int = Field(default=20, ge=1)
@@ -122,17 +131,18 @@ class RefineConfig(Section):
 
     num_rounds: int = Field(default=8, ge=1)
     """Rounds of matching and solving."""
-    match_diameters: tuple[float, float] = (0.02, 0.006)
+    match_diameters: tuple[Positive, Positive] = (0.02, 0.006)
     """Farthest match, in the first and in the last round."""
     contour_weight: float = Field(default=0.3, ge=0)
-    """Weight of the contour term beside the surface term; 0 leaves it out."""
+    """Weight of a contour match beside a surface match of the same precision; 0 leaves contours
+    out."""
 
 
 class FusionConfig(Section):
     """Posed scans -> one mesh."""
 
     voxel_resolutions: float = Field(default=1.5, gt=0)
-    """Edge of a voxel."""
+    """Edge of a voxel, where that is not too fine for the number of voxels below."""
     max_voxels_across: int = Field(default=400, ge=50)
     """Voxels across the object's diameter, at most."""
     truncation_voxels: float = Field(default=4.0, ge=2)
@@ -143,9 +153,11 @@ class Config(Section):
     """All settings of a run; ``Config()`` is what users get who give none."""
 
     seed: int = Field(default=0, ge=0)
-    """Seed of everything random; together with the scans' content it fixes the output's bytes."""
+    """Seed of everything random in a run. No stage draws random numbers as it stands, so that the
+    scans' content and the other settings alone fix the output's bytes."""
     unit: Unit | None = None
-    """Unit of the scans' coordinates; unknown if not given. Nothing depends on it but reports."""
+    """Unit of the scans' coordinates; unknown if not given. It is passed on with the settings in
+    the report, and nothing else depends on it."""
     prepare: PrepareConfig = PrepareConfig()
     heat: HeatConfig = HeatConfig()
     pairs: PairsConfig = PairsConfig()
