@@ -3,8 +3,9 @@
 In short: ``scanweld.run(scanweld.read_scans("scans/"))``.
 """
 
+from scanweld import kernels as kernels  # first: makes room for the kernels of the others
 from scanweld.config import Config, load_config
-from scanweld.errors import ScanweldError
+from scanweld.errors import ConfigError, InputError, ReadError, ScanweldError, WriteError
 from scanweld.evaluation.metrics import evaluate_poses
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -27,15 +28,19 @@ __all__ = [
     "Camera",
     "CameraModel",
     "Config",
+    "ConfigError",
+    "InputError",
     "Pose",
     "PoseSet",
     "RangeScan",
+    "ReadError",
     "Reconstruction",
     "ScanVerdict",
     "ScanweldError",
     "TriangleMesh",
     "Verdict",
     "Viewpoint",
+    "WriteError",
     "evaluate_poses",
     "load_config",
     "read_mesh",
