@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from bodies import make_body
-from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.grid import grid_faces
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
@@ -72,7 +72,7 @@ def crop_to_ball(radius_diameters: float) -> Disturbance:
             assert shot.world_from_sensor is not None
             away = shot.world_from_sensor.apply(shot.scan.points) - spot
             is_near = np.linalg.norm(away, axis=1) < radius_diameters * size
-            kept.append(replace(shot, scan=_subset(shot.scan, is_near)))
+            kept.append(replace(shot, scan=shot.scan.only(is_near)))
         return kept
 
     return crop
@@ -99,7 +99,7 @@ def crop_to_window(share: float) -> Disturbance:
         )
         kept = np.zeros(len(scan.points), dtype=bool)
         kept[grid[grid >= 0]] = True
-        windowed = _subset(replace(scan, grid=np.ascontiguousarray(grid)), kept)
+        windowed = replace(scan, grid=grid).only(kept)
         return replace(windowed, camera=camera)
 
     return each(change)
@@ -222,11 +222,3 @@ def _with_depth(scan: RangeScan, depth: FloatArray) -> RangeScan:
     grid[seen] = np.arange(int(seen.sum()))
     points = scan.camera.unproject_image(depth)[seen]
     return replace(scan, points=points, grid=grid, colors=None)
-
-
-def _subset(scan: RangeScan, kept: BoolArray) -> RangeScan:
-    """Only some of the points (N,) of a scan."""
-    assert scan.grid is not None
-    number = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
-    colors = None if scan.colors is None else scan.colors[kept]
-    return replace(scan, points=scan.points[kept], grid=number[scan.grid], colors=colors)

@@ -125,11 +125,10 @@ class _Scene:
 
     def errors(self, i: str, j: str, alternative: Alternative) -> tuple[float, float]:
         """Rotation in degrees, and translation at j's centroid in percent of the diameter."""
-        scan_i, scan_j = self.prepared[i].scan, self.prepared[j].scan
-        assert scan_i.scan_from_sensor is not None and scan_j.scan_from_sensor is not None
+        scan_i, scan_j = self.prepared[i], self.prepared[j]
         found = scan_i.scan_from_sensor @ alternative.i_from_j @ scan_j.scan_from_sensor.inverse()
         off = (self.reference[i].inverse() @ self.reference[j]).inverse() @ found
-        shift = off.shift_at(scan_j.points.mean(axis=0))
+        shift = off.shift_at(scan_j.scan.points.mean(axis=0))
         return off.angle_deg(), 100.0 * shift / self.object_diameter
 
 

@@ -8,12 +8,10 @@ that hide each other, folds, thin parts, no symmetry, and no two sides alike.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from skimage.measure import marching_cubes
 
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
-from scanweld.geometry.mesh import TriangleMesh, compact
+from scanweld.geometry.mesh import TriangleMesh, compact, pieces
 
 Point = tuple[float, float, float]
 
@@ -230,8 +228,7 @@ def _coat(vertices: FloatArray) -> ByteArray:
 
 def _largest_body(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """The body with the most vertices: on a coarse grid thin tips come off."""
-    ends = (np.ones(2 * len(faces), dtype=bool), faces[:, [0, 1, 1, 2]].reshape(-1, 2).T)
-    _, body = connected_components(coo_matrix(ends, shape=(len(vertices),) * 2), directed=False)
+    body = pieces(faces, len(vertices))
     largest = np.argmax(np.bincount(body))
     vertices, faces, _ = compact(vertices, faces[body[faces[:, 0]] == largest])
     return vertices, faces

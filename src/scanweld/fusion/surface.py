@@ -3,13 +3,11 @@
 import logging
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
 from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume, VoxelArray
 from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.mesh import compact, face_normals
+from scanweld.geometry.mesh import compact, face_normals, pieces
 
 logger = logging.getLogger(__name__)
 
@@ -95,15 +93,11 @@ def drop_small_pieces(
     """The mesh without the connected pieces too small to be trusted; the largest always stays."""
     if not len(faces):
         return vertices, faces
-    n = len(vertices)
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    count, piece_of_vertex = connected_components(graph, directed=False)
-    piece = piece_of_vertex[faces[:, 0]]
+    piece = pieces(faces, len(vertices))[faces[:, 0]]
     face_area = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
-    area = np.bincount(piece, weights=face_area, minlength=count)
+    area = np.bincount(piece, weights=face_area)
     min_area = max(_MIN_PIECE_VOXELS * voxel**2, _MIN_PIECE_SHARE * float(area.sum()))
-    stays = (area >= min_area) | (np.arange(count) == np.argmax(area))
-    logger.debug("%d of %d pieces stay", stays.sum(), count)
+    stays = (area >= min_area) | (np.arange(len(area)) == np.argmax(area))
+    logger.debug("%d of %d pieces stay", stays.sum(), len(area))
     kept, kept_faces, _ = compact(vertices, faces[stays[piece]])
     return kept, kept_faces

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
 
@@ -12,10 +14,13 @@ class TriangleMesh:
     """Vertices (V, 3) and counter-clockwise faces (F, 3); normals point out, or to the sensor.
 
     Attributes:
-        vertices: (V, 3).
+        vertices: (V, 3), in a frame and a unit that the owner of the mesh names.
         faces: (F, 3) vertex indices.
         normals: (V, 3) unit normals or None.
         colors: (V, 3) uint8 or None.
+
+    Raises:
+        ValueError: If the shapes do not fit, or a face names no vertex.
     """
 
     vertices: FloatArray
@@ -37,7 +42,7 @@ class TriangleMesh:
 
 
 def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Normals (F, 3) of faces, as long as twice the face's area."""
+    """Normals (F, 3) of faces of vertices (V, 3), as long as twice the face's area."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
@@ -64,6 +69,15 @@ def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
     is_border[once // num_vertices] = True
     is_border[once % num_vertices] = True
     return is_border
+
+
+def pieces(faces: IntArray, num_vertices: int) -> IntArray:
+    """The connected piece (V,) of each vertex, from 0; one without a face is a piece by itself."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    edges = coo_array(
+        (np.ones(len(start), dtype=bool), (start, end)), shape=(num_vertices, num_vertices)
+    )
+    return connected_components(edges, directed=False)[1].astype(np.int64)
 
 
 def compact(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, IntArray]:

@@ -102,9 +102,7 @@ class PreparedScan:
     @property
     def scan_from_sensor(self) -> Pose:
         """Where the sensor stood: given, fitted or estimated."""
-        if self.scan.scan_from_sensor is None:
-            raise ValueError("a prepared scan has a located sensor")
-        return self.scan.scan_from_sensor
+        return self.scan.sensor_pose
 
     @property
     def name(self) -> str:

@@ -38,6 +38,9 @@ class RangeScan:
         viewpoint: How scan_from_sensor is known.
         num_dropped: NaN and infinite points that were left out on reading.
         notes: What was assumed about this scan, in words, for the report.
+
+    Raises:
+        ValueError: If shapes or indices do not fit, or a point is not finite.
     """
 
     name: str
@@ -91,6 +94,31 @@ class RangeScan:
             camera=self.camera if camera is None else camera,
             notes=self.notes + notes,
         )
+
+    def only(self, kept: BoolArray) -> "RangeScan":
+        """The scan with some of its points (N,) only; faces that lose a corner are dropped."""
+        number = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
+        faces = None if self.faces is None else number[self.faces]
+        return replace(
+            self,
+            points=self.points[kept],
+            grid=None if self.grid is None else number[self.grid],
+            faces=None if faces is None else faces[(faces >= 0).all(axis=1)],
+            normals=None if self.normals is None else self.normals[kept],
+            colors=None if self.colors is None else self.colors[kept],
+            confidence=None if self.confidence is None else self.confidence[kept],
+        )
+
+    @property
+    def sensor_pose(self) -> Pose:
+        """``scan_from_sensor`` of a scan whose sensor is located.
+
+        Raises:
+            ValueError: If it is not.
+        """
+        if self.scan_from_sensor is None:
+            raise ValueError(f"{self.name}: it is unknown where the sensor stood")
+        return self.scan_from_sensor
 
     def content_hash(self) -> str:
         """A hash of everything measured, without the name: the same content gives the same hash."""

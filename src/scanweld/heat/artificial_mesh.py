@@ -7,8 +7,9 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray, frozen
 from scanweld.geometry.camera import Camera
+from scanweld.geometry.mesh import pieces
 from scanweld.heat.back import coarse_faces
-from scanweld.heat.front import FrontMesh, pieces
+from scanweld.heat.front import FrontMesh
 
 _BACK_DIAMETERS = 0.05
 """The back plane lies this far behind the deepest point."""

@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
+from scanweld.geometry.mesh import pieces
 from scanweld.geometry.prepared import RangeImage
 
 _JUMP_PIXELS = 6.0
@@ -167,15 +168,6 @@ def _large_pieces(faces: IntArray, num_vertices: int) -> BoolArray:
     piece = pieces(faces, num_vertices)
     sizes = np.bincount(piece, minlength=1)
     return sizes[piece[faces[:, 0]]] >= max(_SMALLEST_PIECE * num_vertices, 4)
-
-
-def pieces(faces: IntArray, num_vertices: int) -> IntArray:
-    """The connected piece (V,) of each vertex."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    graph = coo_array(
-        (np.ones(len(start), dtype=bool), (start, end)), shape=(num_vertices, num_vertices)
-    )
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _quads(cells: IntArray) -> IntArray:

@@ -23,8 +23,7 @@ def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
         InputError: If the scan shows too little surface to be registered.
     """
     located = locate_sensor(scan)
-    assert located.scan_from_sensor is not None
-    sensor_from_scan = located.scan_from_sensor.inverse()
+    sensor_from_scan = located.sensor_pose.inverse()
     resolution = point_spacing(located.points)
     clean = without_strays(located, sensor_from_scan.apply(located.points), resolution)
     diameter = principal_diameter(clean.points)

@@ -2,25 +2,34 @@
 
 import numpy as np
 from scipy import ndimage
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.grid import grid_faces
-from scanweld.geometry.mesh import TriangleMesh, border_vertices, face_normals, vertex_normals
+from scanweld.geometry.mesh import (
+    TriangleMesh,
+    border_vertices,
+    face_normals,
+    pieces,
+    vertex_normals,
+)
 from scanweld.geometry.prepared import RangeImage
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import RangeScan
 from scanweld.prepare.silhouette import classify_pixels
 
 MARGIN_DIAMETERS = 0.05
+"""Free space that the image holds around the closed silhouette."""
 MIN_PIECE_SHARE = 0.002
+"""Pieces of fewer pixels than this share of the surface's are no surface."""
 MAX_EDGE_PIXELS = 4.0
+"""Points farther apart than this across the line of sight are not joined."""
 POINT_PIXELS = 1.6
+"""Pixel of bare points, in spacings: smaller ones would leave most of the surface empty."""
 NORMAL_SMOOTHING_ROUNDS = 2
 PINHOLE_ROUNDS = 2
+"""Pinholes are filled from their neighbours so many times, a ring of pixels each time."""
 MIN_BETWEEN = 2
 """Pairs of opposite neighbours on one surface that a pixel within it has; an edge has but one."""
 
@@ -45,8 +54,8 @@ def make_range_image(
     pixel = max(resolution * (1.0 if organised else POINT_PIXELS), diameter / config.image_pixels)
     margin = (config.closing_diameters + MARGIN_DIAMETERS) * diameter
     camera = working_camera(scan, points, pixel, margin)
-    if organised:
-        faces = _scan_faces(scan, points, pixel, config)
+    faces = _scan_faces(scan, points, pixel, config)
+    if faces is not None:
         depth, _ = render_depth(points, faces, camera)
         depth = _with_lonely(depth, points, camera, config.jump_pixels * pixel)
     else:
@@ -99,9 +108,9 @@ def working_camera(scan: RangeScan, points: FloatArray, pixel: float, margin: fl
 
 def _scan_faces(
     scan: RangeScan, points: FloatArray, pixel: float, config: PrepareConfig
-) -> IntArray:
+) -> IntArray | None:
+    """Triangles (F, 3) between the scan's points; None for bare points."""
     if scan.grid is None:
-        assert scan.faces is not None
         return scan.faces
     max_step = config.jump_pixels * pixel
     return grid_faces(scan.grid, points, points[:, 2], max_step, MAX_EDGE_PIXELS * pixel)
@@ -197,11 +206,8 @@ def _smoothed_normals(points: FloatArray, faces: IntArray, camera: Camera) -> Fl
 
 def _piece_sizes(mesh: TriangleMesh) -> IntArray:
     """How many vertices (V,) the connected piece of each vertex has."""
-    n = len(mesh.vertices)
-    a, b, c = mesh.faces.T
-    edges = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, c])), shape=(n, n))
-    _, label = connected_components(edges, directed=False)
-    return np.bincount(label)[label] if n else np.zeros(0, dtype=np.int64)
+    piece = pieces(mesh.faces, len(mesh.vertices))
+    return np.bincount(piece)[piece]
 
 
 def _rim(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
