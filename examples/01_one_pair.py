@@ -25,7 +25,7 @@ def register(scans: Sequence[scanweld.RangeScan]) -> PairResult:
     diameter = max(scan.diameter for scan in prepared)
     fields = [make_field(scan, diameter) for scan in prepared]
     anchors = [
-        pair_anchors(field, describe(scan, config.heat), diameter, config.pairs)
+        pair_anchors(field, describe(scan, config.heat), config.pairs)
         for field, scan in zip(fields, prepared, strict=True)
     ]
     sets = list(zip(anchors[0], anchors[1], strict=True))

@@ -33,7 +33,7 @@ def features_of(scan: PreparedScan) -> Features:
 
 def registered(pair: PreparedPair, config: PairsConfig = CONFIG) -> PairResult:
     anchors = [
-        pair_anchors(field, features_of(scan), pair.diameter, config)
+        pair_anchors(field, features_of(scan), config)
         for field, scan in zip(pair.fields, pair.scans, strict=True)
     ]
     both = list(zip(*anchors, strict=True))
@@ -252,7 +252,7 @@ def test_hypotheses_lay_anchor_on_anchor():
 
 def test_the_sweep_finds_hypotheses_near_the_truth():
     pair = creature_pair(30)
-    a, b = (even_anchors(field, 0.07 * pair.diameter) for field in pair.fields)
+    a, b = (even_anchors(field, CONFIG.num_anchors) for field in pair.fields)
     rows, scores = sweep(*pair.fields, a, b, CONFIG.num_turns, 0.04 * pair.diameter, 200)
     errors = np.array([pair.off_by(to_pose(row)) for row in rows])
     is_near = (errors[:, 0] < 15) & (errors[:, 1] < 0.08)
@@ -269,14 +269,14 @@ def test_without_anchors_there_are_no_hypotheses():
     assert result.kind is PairKind.NO_OVERLAP and result.best is None
 
 
-def test_even_anchors_are_far_enough_apart():
-    pair = creature_pair(30)
-    anchors = even_anchors(pair.fields[0], 0.1 * pair.diameter)
+def test_even_anchors_leave_no_part_of_a_scan_out():
+    (field, _), number = creature_pair(30).fields, 40
+    anchors = even_anchors(field, number)
+    assert len(anchors.points) == number
     apart = np.linalg.norm(anchors.points[:, None] - anchors.points, axis=2)
     apart[np.diag_indices_from(apart)] = np.inf
-    assert apart.min() >= 0.1 * pair.diameter
-    reach = np.linalg.norm(pair.fields[0].points[:, None] - anchors.points, axis=2).min(axis=1)
-    assert reach.max() < 0.12 * pair.diameter
+    reach = np.linalg.norm(field.points[:, None] - anchors.points, axis=2).min(axis=1)
+    assert reach.max() <= apart.min()
 
 
 # Distinct poses

@@ -61,13 +61,13 @@ class PairsConfig(Section):
 
     keypoints: Literal["mixed", "heat", "even"] = "mixed"
     """What anchors the hypotheses: PA-HKS keypoints ("heat"), evenly spread points, or both."""
-    anchor_diameters: float = Field(default=0.07, gt=0)
-    """Spacing of evenly spread anchors."""
+    num_anchors: int = Field(default=64, ge=8)
+    """Evenly spread anchors of a scan: a fixed number covers thin objects as well as stout ones."""
     num_turns: int = Field(default=24, ge=8)
     """Turns about the normal that are tried for each pair of anchors."""
     tolerance_diameters: tuple[Positive, Positive, Positive] = (0.04, 0.02, 0.012)
     """Depth tolerance of the evidence, coarse to fine."""
-    num_survivors: tuple[Count, Count] = (300, 30)
+    num_survivors: tuple[Count, Count] = (400, 30)
     """Hypotheses that go on to the first and to the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
     """Distinct poses that are kept for a pair."""

@@ -148,7 +148,7 @@ def pair_registrar(
         config: Settings.
     """
     anchors = [
-        pair_anchors(field, found, diameter, config.pairs)
+        pair_anchors(field, found, config.pairs)
         for field, found in zip(fields, features, strict=True)
     ]
 

@@ -8,6 +8,9 @@ from scanweld.multiview.merge import Judge, is_near
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT, PairKind, PairResult
 
+OUTWEIGHED = 2.0
+"""Accepted pairs outweigh a good one that disagrees if their scores sum to so many times its."""
+
 
 def why_rejected(
     result: PairResult,
@@ -45,8 +48,8 @@ def why_unplaced(scan: int, pairs: Mapping[Edge, PairResult]) -> str:
 
 
 def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int, str]:
-    """What speaks against the final poses of placed scans, by scan."""
-    doubts: dict[int, str] = {}
+    """What speaks against the final poses of placed scans, by scan; known doubts stay."""
+    doubts = dict(graph.doubts)
     for component in graph.components:
         for k in sorted(component.poses):
             share = _violated_share(k, component, judge)
@@ -58,9 +61,15 @@ def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int
             elif not graph.neighbours(k):
                 doubts[k] = "no single pair confirms its pose"
     for edge in _good_but_rejected(graph):
+        against = graph.pairs[edge].alternatives[0].score
         for k in edge:
-            doubts.setdefault(k, "a good pair disagrees with its pose")
+            if _support(k, graph) < OUTWEIGHED * against:
+                doubts.setdefault(k, "a good pair disagrees with its pose")
     return doubts
+
+
+def _support(scan: int, graph: ViewGraph) -> float:
+    return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
 
 
 def _violated_share(scan: int, component: Component, judge: Judge) -> float:

@@ -8,11 +8,11 @@ import numpy as np
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import (
-    CONTRADICT_WEIGHT,
     VIOLATION_WEIGHT,
     Evidence,
     PairKind,
     PairResult,
+    margin_over,
 )
 
 Judge = Callable[[int, int, Pose], Evidence]
@@ -113,7 +113,7 @@ def propose_merges(
         replace(
             merge,
             supports=tuple(s for s in merge.supports if s.alternative not in banned),
-            margin=_margin(merge, merges),
+            margin=margin_over(merge.score, [m.score for m in merges if m is not merge]),
         )
         for merge in merges
     ]
@@ -172,7 +172,7 @@ def _judged(
     a: Poses, b: Poses, a_from_b: Pose, supports: tuple[Support, ...], judge: Judge
 ) -> Merge:
     evidence = [judge(i, j, a[i].inverse() @ a_from_b @ b[j]) for i in sorted(a) for j in sorted(b)]
-    violated = [e.front + CONTRADICT_WEIGHT / VIOLATION_WEIGHT * e.contradict for e in evidence]
+    violated = [e.surface_violation for e in evidence]
     return Merge(
         a_from_b=a_from_b,
         supports=supports,
@@ -181,10 +181,3 @@ def _judged(
         free=sum(e.free for e in evidence),
         worst=max(v - 0.5 * e.agree for v, e in zip(violated, evidence, strict=True)),
     )
-
-
-def _margin(merge: Merge, merges: Sequence[Merge]) -> float:
-    if merge.score <= 0:
-        return 0.0
-    rivals = [other.score for other in merges if other is not merge]
-    return min(1.0, (merge.score - max(rivals)) / merge.score) if rivals else 1.0

@@ -15,7 +15,7 @@ from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 
 logger = logging.getLogger(__name__)
 
-MAX_SCORE_LOSS = 0.01
+MAX_SCORE_LOSS = 0.03
 """Mean score that a refinement may cost: it is judged by few samples."""
 
 
@@ -28,8 +28,8 @@ def refine_graph(
 ) -> ViewGraph:
     """Refine the poses of each component together (paper 3.2); the evidence is the judge.
 
-    A component whose accepted pairs would lose by it keeps its poses, has no residuals, and the
-    log says so.
+    A component whose accepted pairs would lose by it keeps its poses, has no residuals, and its
+    scans are doubtful: where poses are right, surfaces and evidence agree.
 
     Args:
         graph: Components with the poses that the pairs gave them.
@@ -40,19 +40,21 @@ def refine_graph(
     """
     components: list[Component] = []
     rms: dict[int, float] = {}
+    doubts: dict[int, str] = {}
     for component in graph.components:
         edges = [edge for edge in graph.accepted if edge[0] in component.poses]
         refined = refine_poses(scans, component.poses, edges, config, contour_matches)
         loss = _mean_score(component.poses, edges, judge) - _mean_score(refined.poses, edges, judge)
         if loss > MAX_SCORE_LOSS:
             logger.warning("the joint refinement made the evidence worse and is left out")
+            doubts.update(dict.fromkeys(component.poses, "surfaces and evidence pull it apart"))
             components.append(component)
             continue
         to_reference = refined.poses[component.reference].inverse()
         poses = {k: to_reference @ pose for k, pose in refined.poses.items()}
         components.append(replace(component, poses=poses))
         rms.update(scan_rms(refined))
-    return replace(graph, components=tuple(components), rms=rms)
+    return replace(graph, components=tuple(components), rms=rms, doubts=doubts)
 
 
 def _mean_score(poses: Mapping[int, Pose], edges: Sequence[Edge], judge: Judge) -> float:

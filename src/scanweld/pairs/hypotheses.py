@@ -30,13 +30,22 @@ out those near the right one, where a thin object violates more than it agrees."
 
 SEARCH_FREE_WEIGHT = 1.0
 """The silhouette guides the search more than it speaks against an answer: real ones have gaps."""
+SWEEP_VIOLATION_WEIGHT = 2.5
+"""Violations count a little less in the sweep: hypotheses near the right one still violate."""
 
-WEIGHTS = np.zeros(7)
-WEIGHTS[AGREE] = 1.0
-WEIGHTS[FRONT] = -VIOLATION_WEIGHT
-WEIGHTS[CONTRADICT] = -CONTRADICT_WEIGHT
-WEIGHTS[FREE] = -SEARCH_FREE_WEIGHT
-WEIGHTS.flags.writeable = False
+
+def search_weights(violation: float) -> FloatArray:
+    """Weights (7,) of the kinds of evidence while searching; read-only, as kernels take them."""
+    weights = np.zeros(7)
+    weights[AGREE] = 1.0
+    weights[FRONT] = -violation
+    weights[CONTRADICT] = -violation * CONTRADICT_WEIGHT / VIOLATION_WEIGHT
+    weights[FREE] = -SEARCH_FREE_WEIGHT
+    weights.flags.writeable = False
+    return weights
+
+
+SWEEP_WEIGHTS = search_weights(SWEEP_VIOLATION_WEIGHT)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -90,7 +99,7 @@ def sweep(
     turns = np.column_stack([np.cos(angles), np.sin(angles)])
     frames_i, frames_j = anchors_i.frames(), anchors_j.frames()
     scores = _score_all(
-        *kernel_view(i), *kernel_view(j), frames_i, frames_j, turns, WEIGHTS, tolerance
+        *kernel_view(i), *kernel_view(j), frames_i, frames_j, turns, SWEEP_WEIGHTS, tolerance
     )
     flat = scores.ravel()
     order = np.argsort(-flat, kind="stable")[:max_count]

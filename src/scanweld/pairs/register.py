@@ -9,9 +9,9 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.hypotheses import WEIGHTS, Anchors, sweep
+from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
 from scanweld.pairs.icp import IcpSchedule, information_of, refine_poses
-from scanweld.pairs.result import Alternative, PairResult
+from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult
 from scanweld.pairs.verdict import judge_pair
 from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
 
@@ -22,6 +22,7 @@ RIVAL_SHIFT_DIAMETERS = 0.06
 MAX_SWEPT = 4000
 NUM_COARSE_SAMPLES = 200
 NUM_FINE_SAMPLES = 400
+RANKING_WEIGHTS = search_weights(VIOLATION_WEIGHT)
 NUM_POLISHED = 2
 """Alternatives that are refined with all points and contours, at most."""
 MIN_POLISHED_SCORE = -0.1
@@ -103,7 +104,7 @@ def score_poses(
     """Scores (N,) of pose rows (N, 12) by the first samples of each scan."""
     counts = count_evidence(*kernel_view(i), *kernel_view(j), poses, num_samples, tolerance)
     total = np.maximum(counts.sum(axis=2), 1)
-    return ((counts @ WEIGHTS) / total).mean(axis=1)
+    return ((counts @ RANKING_WEIGHTS) / total).mean(axis=1)
 
 
 def _distinct(

@@ -1,5 +1,6 @@
 """Records of the pair stage: evidence, kinds of pairs and their judged relative poses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,8 +10,11 @@ from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
 
 VIOLATION_WEIGHT = 3.0
+"""How much more a sample says that the other sensor contradicts than one that agrees."""
 CONTRADICT_WEIGHT = 1.5
+"""Samples with other normals say less: at edges normals are poor."""
 FREE_WEIGHT = 1.0 / 3.0
+"""Samples in free space say less still: real silhouettes have gaps."""
 
 
 class PairKind(StrEnum):
@@ -48,7 +52,7 @@ class Evidence:
 
     @property
     def score(self) -> float:
-        """Agreement less weighted violations (DESIGN 3.6): 1 is perfect, <= 0 is refused."""
+        """Agreement less weighted violations (docs/report.md): at most 1, which is perfect."""
         violated = VIOLATION_WEIGHT * self.front + CONTRADICT_WEIGHT * self.contradict
         return self.agree - violated - FREE_WEIGHT * self.free
 
@@ -56,6 +60,18 @@ class Evidence:
     def violation(self) -> float:
         """Share of samples that the other sensor contradicts in any way."""
         return self.front + self.contradict + self.free
+
+    @property
+    def surface_violation(self) -> float:
+        """The same without free space, weighted as in the score: what *front* is worth."""
+        return self.front + CONTRADICT_WEIGHT / VIOLATION_WEIGHT * self.contradict
+
+
+def margin_over(score: float, rivals: Sequence[float]) -> float:
+    """Share of a score by which it beats its best rival: 1 without a rival, 0 if not positive."""
+    if score <= 0:
+        return 0.0
+    return min(1.0, (score - max(rivals)) / score) if rivals else 1.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ import numpy as np
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
-from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.result import Alternative, PairKind, PairResult, margin_over
 
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
@@ -18,12 +18,22 @@ def judge_pair(
     rms: float,
     config: PairsConfig,
 ) -> PairResult:
-    """Give a pair its kind: what its evidence, margin and observability allow to say."""
+    """Give a pair its kind: what its evidence, margin and observability allow to say.
+
+    Args:
+        i: Index of the first scan,
+        j: of the second, i < j.
+        alternatives: Distinct poses between the sensor frames, best first.
+        information: (6, 6) information of the best pose, rotations scaled.
+        rms: Residual of the best pose, in the scans' unit; NaN if there is none.
+        config: Settings.
+    """
     eigenvalues = np.linalg.eigvalsh(information)
     observability = (
         float(max(eigenvalues[0], 0.0) / eigenvalues[-1]) if eigenvalues[-1] > 0 else 0.0
     )
-    margin = margin_of(alternatives)
+    scores = [alternative.score for alternative in alternatives]
+    margin = margin_over(scores[0], scores[1:]) if scores else 0.0
     kind, reason = _kind(alternatives, observability, margin, config)
     return PairResult(
         i=i,
@@ -36,16 +46,6 @@ def judge_pair(
         margin=margin,
         rms=rms,
     )
-
-
-def margin_of(alternatives: tuple[Alternative, ...]) -> float:
-    """Share of the best score by which it beats the best distinct rival; 1 without a rival."""
-    if not alternatives or alternatives[0].score <= 0:
-        return 0.0
-    if len(alternatives) == 1:
-        return 1.0
-    best, rival = alternatives[0].score, alternatives[1].score
-    return float(min(1.0, (best - rival) / best))
 
 
 def _kind(

@@ -1,4 +1,4 @@
-"""Visibility evidence: what each scan's sensor says of the other scan's samples (DESIGN 3.6)."""
+"""Visibility evidence: what each scan's sensor says of the other scan's samples."""
 
 import numpy as np
 from numba import njit
@@ -6,13 +6,23 @@ from numpy.typing import NDArray
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.field import ScanField
+from scanweld.geometry.prepared import PixelKind
+from scanweld.pairs.field import (
+    RASTER_DEPTH,
+    RASTER_KIND,
+    RASTER_NORMAL,
+    RASTER_OUTSIDE,
+    ScanField,
+)
 from scanweld.pairs.result import Evidence
 
 AGREE, FRONT, CONTRADICT, FREE, OCCLUDED, UNKNOWN, NEUTRAL = range(7)
+IS_FREE, IS_UNKNOWN = float(PixelKind.FREE), float(PixelKind.UNKNOWN)
 
 AGREE_COSINE = 0.75
+"""Cosine of the two normals above which they agree,"""
 CONTRADICT_COSINE = 0.3
+"""and below which they contradict each other; between the two they say nothing."""
 
 
 def judge(
@@ -79,7 +89,19 @@ def ask(
     nz: float,
     tolerance: float,
 ) -> int:
-    """What a sensor says of one oriented point in its frame: one of the kinds above."""
+    """What a sensor says of one oriented point in its frame: one of the kinds above.
+
+    Args:
+        camera: (5,) parameters of a pinhole or orthographic camera.
+        raster: (H, W, 6) what it saw, see ``ScanField``.
+        x: The point in the sensor frame,
+        y: likewise,
+        z: likewise.
+        nx: Its unit normal,
+        ny: likewise,
+        nz: likewise.
+        tolerance: Of depth, in the scans' unit.
+    """
     height, width = raster.shape[0], raster.shape[1]
     u, v = camera[1] * x, camera[2] * y
     if camera[0] == 0.0:
@@ -92,20 +114,22 @@ def ask(
     # Beyond the image its border speaks: it is free, unless the object left the field of view.
     clamped_u, clamped_v = min(max(u, 0.0), width - 1.0), min(max(v, 0.0), height - 1.0)
     column, row = int(clamped_u + 0.5), int(clamped_v + 0.5)
-    kind = raster[row, column, 5]
-    if kind == 2.0:
+    kind = raster[row, column, RASTER_KIND]
+    if kind == IS_UNKNOWN:
         return UNKNOWN
-    if kind == 1.0:
+    if kind == IS_FREE:
         beyond = abs(u - clamped_u) / camera[1] + abs(v - clamped_v) / camera[2]
         if camera[0] == 0.0:
             beyond *= z
-        return FREE if raster[row, column, 4] + beyond > tolerance else UNKNOWN
-    step = z - raster[row, column, 0]
+        return FREE if raster[row, column, RASTER_OUTSIDE] + beyond > tolerance else UNKNOWN
+    step = z - raster[row, column, RASTER_DEPTH]
     if step > tolerance:
         return OCCLUDED
     if step < -tolerance:
         return FRONT
-    cosine = nx * raster[row, column, 1] + ny * raster[row, column, 2] + nz * raster[row, column, 3]
+    n = RASTER_NORMAL
+    cosine = nx * raster[row, column, n] + ny * raster[row, column, n + 1]
+    cosine += nz * raster[row, column, n + 2]
     if cosine > AGREE_COSINE:
         return AGREE
     return CONTRADICT if cosine < CONTRADICT_COSINE else NEUTRAL
@@ -172,7 +196,23 @@ def count_evidence(
     max_samples: int,
     tolerance: float,
 ) -> NDArray[np.int64]:
-    """Counts (P, 2, 7) of each kind: of i's samples seen by j, of j's samples seen by i."""
+    """Counts (P, 2, 7) of each kind: of i's samples seen by j, of j's samples seen by i.
+
+    The first arguments are the arrays of both scans, as ``kernel_view`` gives them.
+
+    Args:
+        camera_i: (5,).
+        raster_i: (H, W, 6).
+        points_i: (N, 3).
+        normals_i: (N, 3).
+        camera_j: (5,).
+        raster_j: (H, W, 6).
+        points_j: (N, 3).
+        normals_j: (N, 3).
+        poses: (P, 12) rows of i_from_j.
+        max_samples: Samples of each scan that are asked about, at most.
+        tolerance: Of depth, in the scans' unit.
+    """
     counts = np.zeros((poses.shape[0], 2, 7), dtype=np.int64)
     for p in range(poses.shape[0]):
         pose = poses[p]
