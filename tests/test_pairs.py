@@ -15,7 +15,7 @@ from scanweld.heat.features import Features, describe
 from scanweld.pairs.anchors import even_anchors, pair_anchors
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
-from scanweld.pairs.icp import IcpSchedule, information_of, refine_poses
+from scanweld.pairs.icp import IcpSchedule, icp, information_of
 from scanweld.pairs.register import register_pair, to_pose
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.visibility import pose_rows
@@ -195,7 +195,7 @@ def schedule(pair: PreparedPair, rounds: int = 15, first: float = 0.05) -> IcpSc
 @pytest.mark.parametrize("gap", [30, 60, 90])
 def test_icp_stays_at_the_truth(gap: float, model: CameraModel):
     pair = creature_pair(gap, model)
-    refined = refine_poses(*pair.fields, pose_rows([pair.i_from_j]), schedule(pair), pair.diameter)
+    refined = icp(*pair.fields, pose_rows([pair.i_from_j]), schedule(pair), pair.diameter)
     degrees, shift = pair.off_by(to_pose(refined[0]))
     assert degrees < 0.4 and shift < 0.002
 
@@ -211,7 +211,7 @@ def test_icp_returns_to_the_truth():
         twist[3:] *= 0.02 * pair.diameter / np.linalg.norm(twist[3:])
         starts.append(pair.i_from_j @ middle @ Pose.exp(twist) @ middle.inverse())
     wide = schedule(pair, rounds=20, first=0.08)
-    refined = refine_poses(*pair.fields, pose_rows(starts), wide, pair.diameter)
+    refined = icp(*pair.fields, pose_rows(starts), wide, pair.diameter)
     errors = np.array([pair.off_by(to_pose(row)) for row in refined])
     assert (errors[:, 0] < 0.4).all() and (errors[:, 1] < 0.003).all()
     turns = refined[:, :9].reshape(-1, 3, 3)
@@ -222,7 +222,7 @@ def test_icp_leaves_a_pose_without_matches_alone():
     pair = creature_pair(30)
     far = Pose(rotation=np.eye(3), translation=np.array([50.0 * pair.diameter, 0, 0]))
     rows = pose_rows([far])
-    refined = refine_poses(*pair.fields, rows, schedule(pair), pair.diameter)
+    refined = icp(*pair.fields, rows, schedule(pair), pair.diameter)
     np.testing.assert_array_equal(refined, rows)
 
 

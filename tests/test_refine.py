@@ -196,9 +196,7 @@ def graph_at(poses: Mapping[int, Pose]) -> ViewGraph:
     to_reference = poses[1].inverse()
     component = Component(poses={k: to_reference @ pose for k, pose in poses.items()}, reference=1)
     accepted = {
-        (min(edge), max(edge)): Alternative(
-            i_from_j=Pose.identity(), evidence=evidence(agree=1.0), overlap=1.0
-        )
+        (min(edge), max(edge)): Alternative(i_from_j=Pose.identity(), evidence=evidence(agree=1.0))
         for edge in RING
     }
     return ViewGraph(pairs={}, accepted=accepted, rejected={}, components=(component,), unplaced={})

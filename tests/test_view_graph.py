@@ -45,7 +45,7 @@ def seen(agree: float) -> Evidence:
 
 
 def option(i_from_j: Pose, agree: float = GOOD) -> Alternative:
-    return Alternative(i_from_j=i_from_j, evidence=seen(agree), overlap=agree)
+    return Alternative(i_from_j=i_from_j, evidence=seen(agree))
 
 
 def pair_of(i: int, j: int, kind: PairKind, *options: Alternative) -> PairResult:

@@ -6,7 +6,7 @@ from scanweld.config import GraphConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.multiview.merge import Judge, is_near
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
-from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT, PairKind, PairResult
+from scanweld.pairs.result import PairKind, PairResult
 
 OUTWEIGHED = 2.0
 """Accepted pairs outweigh a good one that disagrees if their scores sum to so many times its."""
@@ -77,8 +77,7 @@ def _violated_share(scan: int, component: Component, judge: Judge) -> float:
     poses = component.poses
     evidence = [judge(scan, m, poses[scan].inverse() @ poses[m]) for m in poses if m != scan]
     agree = sum(e.agree for e in evidence)
-    weight = CONTRADICT_WEIGHT / VIOLATION_WEIGHT
-    violated = sum(e.front + weight * e.contradict for e in evidence)
+    violated = sum(e.surface_violation for e in evidence)
     return violated / max(agree, 1e-9)
 
 

@@ -20,7 +20,9 @@ from scanweld.pairs.visibility import (
 )
 
 NUM_FIRST_LOOK = 12
+"""Samples of each scan that decide whether a hypothesis is looked at again,"""
 NUM_SECOND_LOOK = 64
+"""and that its score rests on."""
 FIRST_LOOK_FLOOR = -0.35
 """Score of the first few samples below which a hypothesis is not looked at again."""
 
@@ -142,6 +144,10 @@ def _score_all(
     weights: FloatArray,
     tolerance: float,
 ) -> FloatArray:
+    """Scores (A, B, T) of all anchors of i, anchors of j and turns; -inf for what was given up.
+
+    The first looks decide about most; the samples come in an order in which few are spread evenly.
+    """
     scores = np.full((frames_i.shape[0], frames_j.shape[0], turns.shape[0]), -np.inf)
     num = min(NUM_SECOND_LOOK, points_i.shape[0], points_j.shape[0])
     pose = np.empty(12)

@@ -10,9 +10,11 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.field import ScanField
 
 MIN_AGREEMENT = 0.8
+"""Cosine of the two normals below which a match is refused."""
 DAMPING = 1e-3
 """Share of the mean diagonal that is added to the normal equations."""
 MIN_MATCHES = 12
+"""A pose with fewer matches than this stays where it is."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -36,13 +38,20 @@ class IcpSchedule:
         return np.geomspace(self.first_radius, self.last_radius, self.num_rounds)
 
 
-def refine_poses(
+def icp(
     i: ScanField, j: ScanField, poses: FloatArray, schedule: IcpSchedule, diameter: float
 ) -> FloatArray:
     """Refine pose rows (N, 12) of i_from_j; each direction's samples seek the other's surface.
 
     Matches on rims, farther than the radius or with normals that disagree take no part. A pose
     that loses its matches stays where it is.
+
+    Args:
+        i: First scan.
+        j: Second scan.
+        poses: (N, 12) rows of i_from_j.
+        schedule: Rounds, radii and samples.
+        diameter: Diameter of the run.
     """
     refined = np.array(poses)
     middle = np.concatenate([i.centre, j.centre])
@@ -108,6 +117,7 @@ def _refine_all(
     middle: FloatArray,
     turn_scale: float,
 ) -> None:
+    """Refine the pose rows (N, 12) in place, turning about the middle of both scans."""
     h, g, sums, centre = np.zeros((6, 6)), np.zeros(6), np.zeros(5), np.zeros(3)
     for p in range(poses.shape[0]):
         pose = poses[p]

@@ -1,6 +1,6 @@
 """Two scans -> distinct relative poses with their evidence, from any start pose."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -10,18 +10,25 @@ from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
-from scanweld.pairs.icp import IcpSchedule, information_of, refine_poses
+from scanweld.pairs.icp import IcpSchedule, icp, information_of
 from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult
-from scanweld.pairs.verdict import judge_pair
+from scanweld.pairs.verdict import classify_pair
 from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
 
 SAME_ANGLE_DEG = 8.0
+"""Hypotheses that differ by less than this,"""
 SAME_SHIFT_DIAMETERS = 0.04
+"""and put the middle of j to within this of each other, come to the same."""
 RIVAL_ANGLE_DEG = 12.0
+"""Likewise for answers: what is nearer than this is the same answer, not a rival,"""
 RIVAL_SHIFT_DIAMETERS = 0.06
+"""if the shift is, too."""
 MAX_SWEPT = 4000
+"""Hypotheses of each set of anchors that are kept at all."""
 NUM_COARSE_SAMPLES = 200
+"""Samples of a scan that take part while many poses are looked at roughly,"""
 NUM_FINE_SAMPLES = 400
+"""and while those that are left are looked at closely."""
 RANKING_WEIGHTS = search_weights(VIOLATION_WEIGHT)
 NUM_POLISHED = 2
 """Alternatives that are refined with all points and contours, at most."""
@@ -39,7 +46,7 @@ def register_pair(
     j: int,
     field_i: ScanField,
     field_j: ScanField,
-    anchors: list[tuple[Anchors, Anchors]],
+    anchors: Sequence[tuple[Anchors, Anchors]],
     diameter: float,
     config: PairsConfig,
     polish: Polish | None = None,
@@ -60,12 +67,21 @@ def register_pair(
         The result, with pose i_from_j between the sensor frames.
     """
     coarse, middle, fine = (t * diameter for t in config.tolerance_diameters)
-    swept = [sweep(field_i, field_j, a, b, config.num_turns, coarse, MAX_SWEPT) for a, b in anchors]
-    poses = np.concatenate([p for p, _ in swept])
-    scores = np.concatenate([s for _, s in swept])
-    order = np.argsort(-scores, kind="stable")
-    poses = _distinct(poses[order], field_j, diameter, config.num_survivors[0])
+    far, near = _schedules(diameter)
+    poses = _swept(field_i, field_j, anchors, config.num_turns, coarse)
+    poses = _distinct(poses, field_j, diameter, config.num_survivors[0])
+    poses = _refined(field_i, field_j, poses, far, diameter, middle)
+    poses = _distinct(poses, field_j, diameter, config.num_survivors[1])
+    poses = _refined(field_i, field_j, poses, near, diameter, fine)
+    poses = _distinct(poses, field_j, diameter, config.num_alternatives, rivals=True)
+    alternatives = _ranked([alternative_at(field_i, field_j, to_pose(row), fine) for row in poses])
+    if polish is not None:
+        alternatives = _ranked(_polished(field_i, field_j, alternatives, polish, fine))
+    return _result(i, j, field_i, field_j, tuple(alternatives), diameter, config)
 
+
+def _schedules(diameter: float) -> tuple[IcpSchedule, IcpSchedule]:
+    """Of many poses roughly, and of those that are left closely."""
     far = IcpSchedule(
         num_rounds=8,
         first_radius=0.08 * diameter,
@@ -78,24 +94,56 @@ def register_pair(
         last_radius=0.01 * diameter,
         num_samples=NUM_FINE_SAMPLES,
     )
-    for schedule, tolerance, count in (
-        (far, middle, config.num_survivors[1]),
-        (near, fine, config.num_alternatives),
-    ):
-        poses = refine_poses(field_i, field_j, poses, schedule, diameter)
-        scores = score_poses(field_i, field_j, poses, schedule.num_samples, tolerance)
-        poses = poses[np.argsort(-scores, kind="stable")]
-        is_last = schedule is near
-        poses = _distinct(poses, field_j, diameter, count, rivals=is_last)
-    alternatives = [alternative_at(field_i, field_j, to_pose(row), fine) for row in poses]
-    alternatives.sort(key=lambda alternative: -alternative.score)
+    return far, near
+
+
+def _swept(
+    i: ScanField,
+    j: ScanField,
+    anchors: Sequence[tuple[Anchors, Anchors]],
+    num_turns: int,
+    tolerance: float,
+) -> FloatArray:
+    """The best hypotheses (N, 12) of all sets of anchors together, best first."""
+    swept = [sweep(i, j, a, b, num_turns, tolerance, MAX_SWEPT) for a, b in anchors]
+    poses = np.concatenate([poses for poses, _ in swept])
+    scores = np.concatenate([scores for _, scores in swept])
+    return poses[np.argsort(-scores, kind="stable")]
+
+
+def _refined(
+    i: ScanField,
+    j: ScanField,
+    poses: FloatArray,
+    schedule: IcpSchedule,
+    diameter: float,
+    tolerance: float,
+) -> FloatArray:
+    """Poses (N, 12) after ICP, best first by the evidence at that tolerance."""
+    poses = icp(i, j, poses, schedule, diameter)
+    scores = score_poses(i, j, poses, schedule.num_samples, tolerance)
+    return poses[np.argsort(-scores, kind="stable")]
+
+
+def _ranked(alternatives: Sequence[Alternative]) -> list[Alternative]:
+    return sorted(alternatives, key=lambda alternative: -alternative.score)
+
+
+def _polished(
+    i: ScanField,
+    j: ScanField,
+    alternatives: Sequence[Alternative],
+    polish: Polish,
+    tolerance: float,
+) -> list[Alternative]:
+    """The alternatives, the best of them refined once more where the evidence bears it."""
+    polished = list(alternatives)
     for k, alternative in enumerate(alternatives[:NUM_POLISHED]):
-        if polish is not None and alternative.score > MIN_POLISHED_SCORE:
-            polished = alternative_at(field_i, field_j, polish(alternative.i_from_j), fine)
-            if polished.score > alternative.score - MAX_POLISHING_LOSS:
-                alternatives[k] = polished
-    alternatives.sort(key=lambda alternative: -alternative.score)
-    return _result(i, j, field_i, field_j, tuple(alternatives), diameter, config)
+        if alternative.score > MIN_POLISHED_SCORE:
+            option = alternative_at(i, j, polish(alternative.i_from_j), tolerance)
+            if option.score > alternative.score - MAX_POLISHING_LOSS:
+                polished[k] = option
+    return polished
 
 
 def score_poses(
@@ -129,13 +177,13 @@ def _result(
         radius = config.tolerance_diameters[2] * diameter
         (row,) = pose_rows([alternatives[0].i_from_j])
         information, rms, _ = information_of(field_i, field_j, row, radius, diameter)
-    return judge_pair(i, j, alternatives, information, rms, config)
+    return classify_pair(i, j, alternatives, information, rms, config)
 
 
 def alternative_at(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> Alternative:
     """A pose with its full evidence."""
     evidence = mean_evidence(*judge(i, j, i_from_j, tolerance))
-    return Alternative(i_from_j=i_from_j, evidence=evidence, overlap=evidence.agree)
+    return Alternative(i_from_j=i_from_j, evidence=evidence)
 
 
 def to_pose(row: FloatArray) -> Pose:

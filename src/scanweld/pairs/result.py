@@ -80,7 +80,6 @@ class Alternative:
 
     i_from_j: Pose
     evidence: Evidence
-    overlap: float
 
     @property
     def score(self) -> float:

@@ -10,7 +10,7 @@ MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
 
 
-def judge_pair(
+def classify_pair(
     i: int,
     j: int,
     alternatives: tuple[Alternative, ...],
