@@ -149,17 +149,24 @@ def _cluster(
     proposals: list[tuple[Pose, Support]], middle: FloatArray, near: tuple[float, float]
 ) -> list[tuple[Pose, tuple[Support, ...]]]:
     """Proposals near a stronger one support it; clusters with most support first."""
-    heads: list[tuple[Pose, list[Support]]] = []
-    for motion, support in proposals:
-        for head, supports in heads:
-            if is_near(head, motion, middle, near):
-                if all((s.i, s.j) != (support.i, support.j) for s in supports):
-                    supports.append(support)
-                break
-        else:
-            heads.append((motion, [support]))
-    heads.sort(key=lambda cluster: -sum(s.score - MIN_CANDIDATE_SCORE for s in cluster[1]))
-    return [(motion, tuple(supports)) for motion, supports in heads]
+    turns = np.array([motion.rotation.ravel() for motion, _ in proposals]).reshape(-1, 9)
+    middles = np.array([motion.apply(middle) for motion, _ in proposals]).reshape(-1, 3)
+    min_trace = 1.0 + 2.0 * np.cos(np.radians(near[0]))
+    clusters: list[tuple[Pose, tuple[Support, ...]]] = []
+    left = np.arange(len(proposals))
+    while len(left):
+        head = left[0]
+        shift = np.linalg.norm(middles[left] - middles[head], axis=1)
+        joins = (turns[left] @ turns[head] > min_trace) & (shift < near[1])
+        joins[0] = True
+        supports: dict[tuple[int, int], Support] = {}
+        for n in left[joins]:
+            support = proposals[n][1]
+            supports.setdefault((support.i, support.j), support)
+        clusters.append((proposals[head][0], tuple(supports.values())))
+        left = left[~joins]
+    clusters.sort(key=lambda cluster: -sum(s.score - MIN_CANDIDATE_SCORE for s in cluster[1]))
+    return clusters
 
 
 def is_near(p: Pose, q: Pose, middle: FloatArray, near: tuple[float, float]) -> bool:
