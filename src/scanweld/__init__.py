@@ -21,20 +21,31 @@ from scanweld.io import (
     write_scan_ply,
 )
 from scanweld.io.scans import read_scans
+from scanweld.pairs.result import Evidence, PairKind
 from scanweld.pipeline import run
-from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+from scanweld.reconstruction import (
+    PairReport,
+    Reconstruction,
+    ScanReport,
+    ScanVerdict,
+    Verdict,
+)
 
 __all__ = [
     "Camera",
     "CameraModel",
     "Config",
     "ConfigError",
+    "Evidence",
     "InputError",
+    "PairKind",
+    "PairReport",
     "Pose",
     "PoseSet",
     "RangeScan",
     "ReadError",
     "Reconstruction",
+    "ScanReport",
     "ScanVerdict",
     "ScanweldError",
     "TriangleMesh",

@@ -185,7 +185,7 @@ def _build_graph(
             pairs,
             [field.centre for field in fields],
             intake.diameter,
-            make_judge(fields, intake.diameter, config),
+            _pair_judge(fields, intake.diameter, config),
             settle,
             config.graph,
         )
@@ -194,8 +194,8 @@ def _build_graph(
     return graph
 
 
-def make_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
-    """The evidence on any pair of scans at any pose, from a few hundred samples each."""
+def _pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
+    """What gives the evidence on any pair of scans at any pose, by a few hundred samples each."""
     tolerance = config.pairs.tolerance_diameters[2] * diameter
 
     def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
@@ -214,7 +214,7 @@ def _refine(
     stages: Stages,
 ) -> ViewGraph:
     """Refine each component's poses together (paper 3.2), and doubt what comes out."""
-    judge_pair = make_judge(fields, intake.diameter, config)
+    judge_pair = _pair_judge(fields, intake.diameter, config)
     with stages.stage("refine") as counts:
         graph = refine_graph(graph, intake.prepared, contours, judge_pair, config.refine)
         graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))

@@ -19,6 +19,7 @@ from scanweld.geometry.scan import principal_diameter
 logger = logging.getLogger(__name__)
 
 _MIN_PIXELS = 10
+"""Surface pixels of all scans together, at least."""
 
 
 def fuse(
@@ -36,7 +37,8 @@ def fuse(
         scans has them. Parts that no scan saw are left open.
 
     Raises:
-        InputError: If the scans hold no surface to fuse.
+        InputError: If the scans hold no surface to fuse, or lie too far apart.
+        ValueError: If there are not as many poses as scans.
     """
     if len(scans) != len(world_from_sensor):
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
@@ -50,7 +52,7 @@ def fuse(
     normals = vertex_normals(vertices, faces)
     reach = max(2.0 * voxel, *(2.0 * scan.resolution for scan in scans))
     colors = blend_colors(vertices, normals, scans, images, reach)
-    logger.info("fused %d scans into %d faces", len(scans), len(faces))
+    logger.debug("fused %d scans into %d faces", len(scans), len(faces))
     return TriangleMesh(vertices=vertices, faces=faces, normals=normals, colors=colors)
 
 

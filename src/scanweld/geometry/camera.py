@@ -24,7 +24,20 @@ class CameraModel(IntEnum):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Camera:
-    """Intrinsics of a sensor. Pixel centres lie at integers, u counts columns, v rows."""
+    """Intrinsics of a sensor. Pixel centres lie at integers, u counts columns, v rows.
+
+    Attributes:
+        model: What the other numbers mean.
+        width: Columns.
+        height: Rows.
+        fx: Focal length along u, see the model for its unit.
+        fy: Likewise along v.
+        cx: Where the axis meets the image, in columns,
+        cy: and in rows.
+
+    Raises:
+        ValueError: If there are no pixels, or a number is out of its range.
+    """
 
     model: CameraModel
     width: int

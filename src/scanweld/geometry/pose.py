@@ -17,6 +17,9 @@ class Pose:
     Attributes:
         rotation: (3, 3), orthonormal with determinant +1.
         translation: (3,), in the unit of the scans.
+
+    Raises:
+        ValueError: If it is not finite, or the matrix no rotation.
     """
 
     rotation: FloatArray
@@ -37,7 +40,11 @@ class Pose:
 
     @staticmethod
     def from_matrix(matrix: ArrayLike) -> "Pose":
-        """The pose of a homogeneous (4, 4) matrix; its rotation is made orthonormal."""
+        """The pose of a homogeneous (4, 4) matrix; its rotation is made orthonormal.
+
+        Raises:
+            ValueError: If the matrix is not a rigid motion to three digits.
+        """
         m = np.asarray(matrix, dtype=np.float64)
         if m.shape != (4, 4) or not np.allclose(m[3], [0, 0, 0, 1]):
             raise ValueError("a rigid motion is a 4x4 matrix with last row 0 0 0 1")
