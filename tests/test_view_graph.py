@@ -192,6 +192,22 @@ def test_bad_diagonal_is_found(agree: float):
     assert set(graph.doubts) == {0.2: set(), 0.35: set(), 0.65: {2, 3}}[agree]
 
 
+def test_attempts_do_not_settle_the_same_component_again():
+    """A bad diagonal makes the graph try again without each pair; most merges stay the same."""
+    world = world_of(5)
+    pairs = exact_pairs(DIAGONAL, world)
+    pairs[2, 3] = turned(pairs[2, 3], degrees=15)
+    settled: list[bytes] = []
+
+    def settle(poses: Mapping[int, Pose]) -> Mapping[int, Pose]:
+        settled.append(b"".join(b"%d" % k + pose.matrix().tobytes() for k, pose in poses.items()))
+        return poses
+
+    only_component(graph_of(world, pairs, settle=settle), world)
+    assert len(settled) > len(world) - 2
+    assert len(set(settled)) == len(settled)
+
+
 def test_a_good_graph_is_accepted_whole():
     world = world_of(5)
     graph = graph_of(world, exact_pairs(DIAGONAL, world))

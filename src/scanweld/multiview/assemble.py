@@ -1,5 +1,6 @@
 """Pairs -> view graph: merge greedily from the strongest, judged by all implied pairs."""
 
+import hashlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,7 +9,15 @@ from scanweld.config import GraphConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.multiview.explain import why_rejected, why_unplaced
-from scanweld.multiview.merge import Judge, Merge, Support, is_near, propose_merges
+from scanweld.multiview.merge import (
+    Judge,
+    Merge,
+    Poses,
+    Support,
+    is_near,
+    propose_merges,
+    without,
+)
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 
@@ -45,6 +54,15 @@ class _Problem:
     judge: Judge
     settle: Settle
     config: GraphConfig
+    memory: "_Memory" = field(default_factory=lambda: _Memory(merges={}, settled={}))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class _Memory:
+    """What attempts found out, by the content of components: most attempts come by it again."""
+
+    merges: dict[tuple[bytes, bytes], list[Merge]]
+    settled: dict[bytes, Poses]
 
 
 def build_view_graph(
@@ -108,7 +126,7 @@ def _assemble(problem: _Problem, banned: frozenset[tuple[int, int, int]]) -> _As
         merged = dict(sorted({**components[a], **moved}.items()))
         used.extend(merge.supports)
         components = [c for n, c in enumerate(components) if n not in (a, b)]
-        components.append(problem.settle(merged) if len(merged) > 2 else merged)
+        components.append(_settled(problem, merged))
         logger.debug("merged into %s: score %.2f", sorted(merged), merge.score)
     placed = tuple(c for c in components if len(c) > 1)
     return _Assembly(components=placed, used=tuple(used), accepted=_accepted(problem, placed))
@@ -125,20 +143,38 @@ def _best_merge(
         for b in range(a + 1, len(components)):
             key = (tuple(components[a]), tuple(components[b]))
             if key not in known:
-                merges = propose_merges(
-                    components[a],
-                    components[b],
-                    problem.pairs,
-                    problem.centres,
-                    problem.near,
-                    problem.judge,
-                    banned,
-                )
+                merges = without(_merges(problem, components[a], components[b]), banned)
                 known[key] = merges[0] if merges and passes(merges[0], problem.config) else None
             merge = known[key]
             if merge is not None and (best is None or merge.score > best[0].score):
                 best = (merge, a, b)
     return best
+
+
+def _merges(problem: _Problem, a: Poses, b: Poses) -> list[Merge]:
+    key = _content(a), _content(b)
+    if key not in problem.memory.merges:
+        problem.memory.merges[key] = propose_merges(
+            a, b, problem.pairs, problem.centres, problem.near, problem.judge
+        )
+    return problem.memory.merges[key]
+
+
+def _settled(problem: _Problem, poses: Poses) -> Poses:
+    if len(poses) < 3:
+        return poses
+    key = _content(poses)
+    if key not in problem.memory.settled:
+        problem.memory.settled[key] = problem.settle(poses)
+    return problem.memory.settled[key]
+
+
+def _content(poses: Poses) -> bytes:
+    """A hash of which scans a component holds, and exactly where."""
+    digest = hashlib.sha256()
+    for k, pose in poses.items():
+        digest.update(b"%d" % k + pose.rotation.tobytes() + pose.translation.tobytes())
+    return digest.digest()
 
 
 def passes(merge: Merge, config: GraphConfig) -> bool:

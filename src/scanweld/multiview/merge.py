@@ -1,6 +1,6 @@
 """Ways to lay one component of placed scans onto another, and what all their scans say of it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,11 +89,8 @@ def propose_merges(
     centres: Sequence[FloatArray],
     near: tuple[float, float],
     judge: Judge,
-    banned: frozenset[tuple[int, int, int]] = frozenset(),
 ) -> list[Merge]:
     """Distinct ways to merge two components, best first, each with its margin over its rivals.
-
-    What may not propose is a rival still: taking a pair back does not make another one surer.
 
     Args:
         a: First component.
@@ -102,22 +99,29 @@ def propose_merges(
         centres: (3,) middle of each scan's samples, sensor frame.
         near: Angle in degrees and shift within which two proposals are the same.
         judge: Gives the evidence on any pair at any pose.
-        banned: Alternatives (i, j, rank), i < j, that may not propose.
     """
     proposals = _proposals(a, b, pairs)
     middle = np.mean([b[j].apply(centres[j]) for j in sorted(b)], axis=0)
     clusters = _cluster(proposals, middle, near)[:MAX_JUDGED]
     merges = [_judged(a, b, motion, supports, judge) for motion, supports in clusters]
     merges.sort(key=lambda merge: -merge.score)
-    allowed = [
-        replace(
-            merge,
-            supports=tuple(s for s in merge.supports if s.alternative not in banned),
-            margin=margin_over(merge.score, [m.score for m in merges if m is not merge]),
-        )
+    return [
+        replace(merge, margin=margin_over(merge.score, [m.score for m in merges if m is not merge]))
         for merge in merges
     ]
-    return [merge for merge in allowed if merge.supports]
+
+
+def without(merges: Sequence[Merge], banned: Collection[tuple[int, int, int]]) -> list[Merge]:
+    """Merges that others than the banned alternatives (i, j, rank), i < j, propose too.
+
+    Their margins stay: what may not propose is a rival still, and taking a pair back does not make
+    another one surer.
+    """
+    left = [
+        replace(merge, supports=tuple(s for s in merge.supports if s.alternative not in banned))
+        for merge in merges
+    ]
+    return [merge for merge in left if merge.supports]
 
 
 def _proposals(
