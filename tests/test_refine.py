@@ -163,7 +163,6 @@ def test_residuals_say_how_pairs_lie():
         residual = refined.pairs[min(pair), max(pair)]
         assert residual.num_matches > 150
         assert 0 < residual.rms < 0.5 * scans[0].image.pixel
-        assert np.linalg.eigvalsh(residual.information)[0] > 0
 
 
 def test_matches_lie_on_the_other_surface():

@@ -8,7 +8,6 @@ from itertools import permutations
 import numpy as np
 
 from scanweld.config import RefineConfig
-from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
@@ -41,13 +40,10 @@ class PairResidual:
     Attributes:
         num_matches: Surface matches, both directions.
         rms: Of the robustly weighted point-to-plane residuals, in the scans' unit.
-        information: (6, 6) of a small motion of one scan against the other: rotation (radians)
-            about the centroid of the matches, then translation, along the world's axes.
     """
 
     num_matches: int
     rms: float
-    information: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -161,18 +157,7 @@ def _residuals(terms: Sequence[Term]) -> dict[tuple[int, int], PairResidual]:
     both: dict[tuple[int, int], list[Term]] = {}
     for term in terms:
         both.setdefault((min(term.i, term.j), max(term.i, term.j)), []).append(term)
-    return {pair: _pair_residual(sides) for pair, sides in sorted(both.items())}
-
-
-def _pair_residual(sides: Sequence[Term]) -> PairResidual:
-    centre = np.concatenate([term.points for term in sides]).mean(axis=0)
-    rms = _rms(sides)
-    information = np.zeros((6, 6))
-    for term in sides:
-        jacobian = term.jacobian(centre, 1.0)
-        information += (jacobian * term.weights[:, None]).T @ jacobian
-    return PairResidual(
-        num_matches=sum(len(term.residuals) for term in sides),
-        rms=rms,
-        information=information / rms**2 if rms > 0 else information,
-    )
+    return {
+        pair: PairResidual(num_matches=sum(len(term.residuals) for term in sides), rms=_rms(sides))
+        for pair, sides in sorted(both.items())
+    }

@@ -40,7 +40,12 @@ class SurfaceSource:
 
 
 def surface_source(scan: PreparedScan, num_points: int) -> SurfaceSource:
-    """Thin the range image of a scan to points for matching, evenly by area."""
+    """Thin the range image of a scan to points for matching, evenly by area.
+
+    Args:
+        scan: A prepared scan.
+        num_points: How many are kept, at most.
+    """
     image = scan.image
     points = image.points()
     view = image.camera.view_directions(points)
@@ -62,6 +67,15 @@ def surface_matches(i: SurfaceSource, j: SurfaceSource, j_from_i: Pose, radius: 
 
     Refused are matches farther than the radius, with normals that disagree, on j's rim, and
     those whose closest point j's image does not show.
+
+    Args:
+        i: The scan whose points are matched.
+        j: The scan they are matched to.
+        j_from_i: The pose, between the sensor frames.
+        radius: Farthest match, in the scans' unit.
+
+    Returns:
+        Matches in the sensor frame of j.
     """
     moved = j_from_i.apply(i.points)
     turned = j_from_i.turn(i.normals)
