@@ -19,7 +19,7 @@ from scanweld.pairs.visibility import (
     kernel_view,
 )
 
-NUM_FIRST_LOOK = 12
+NUM_FIRST_LOOK = 8
 """Samples of each scan that decide whether a hypothesis is looked at again,"""
 NUM_SECOND_LOOK = 64
 """and that its score rests on."""

@@ -30,8 +30,6 @@ POINT_PIXELS = 1.6
 NORMAL_SMOOTHING_ROUNDS = 2
 PINHOLE_ROUNDS = 2
 """Pinholes are filled from their neighbours so many times, a ring of pixels each time."""
-MIN_BETWEEN = 2
-"""Pairs of opposite neighbours on one surface that a pixel within it has; an edge has but one."""
 
 
 def make_range_image(
@@ -57,7 +55,9 @@ def make_range_image(
     faces = _scan_faces(scan, points, pixel, config)
     if faces is not None:
         depth, _ = render_depth(points, faces, camera)
-        depth = _with_lonely(depth, points, camera, config.jump_pixels * pixel)
+        # Points that lost returns have cut off from every face are surface too: without them the
+        # silhouette shrinks, and right poses seem to lie in free space.
+        depth = np.where(np.isfinite(depth), depth, _splat(points, camera))
     else:
         depth = _splat(points, camera)
     for _ in range(PINHOLE_ROUNDS):
@@ -117,7 +117,7 @@ def _scan_faces(
 
 
 def _splat(points: FloatArray, camera: Camera) -> FloatArray:
-    """Nearest depth of the points in each pixel; small gaps within a surface are filled."""
+    """Nearest depth of the points in each pixel, NaN where there is none."""
     pixels, z = camera.project(points)
     u, v = np.rint(pixels).astype(np.int64).T
     depth = np.full((camera.height, camera.width), np.inf)
@@ -126,21 +126,11 @@ def _splat(points: FloatArray, camera: Camera) -> FloatArray:
     return depth
 
 
-def _with_lonely(depth: FloatArray, points: FloatArray, camera: Camera, step: float) -> FloatArray:
-    """The depth with points inside the surface that lost returns have cut off from every face."""
-    lonely = np.where(np.isfinite(depth), np.nan, _splat(points, camera))
-    _, count = _between(np.where(np.isfinite(depth), depth, lonely), step)
-    return np.where(np.isfinite(lonely) & (count >= MIN_BETWEEN), lonely, depth)
-
-
 def _fill_pinholes(depth: FloatArray, max_step: float) -> FloatArray:
-    """Fill empty pixels that lie within one surface: lost returns, gaps of a splat."""
-    mean, count = _between(depth, max_step)
-    return np.where(np.isnan(depth) & (count > 0), mean, depth)
+    """Fill empty pixels between opposite neighbours on one surface: lost returns, gaps of a splat.
 
-
-def _between(depth: FloatArray, max_step: float) -> tuple[FloatArray, FloatArray]:
-    """Of each pixel's four pairs of opposite neighbours on one surface: mean depth, number."""
+    They get the mean depth of all such pairs of neighbours.
+    """
     padded = np.pad(depth, 1, constant_values=np.nan)
     height, width = depth.shape
     total, count = np.zeros(depth.shape), np.zeros(depth.shape)
@@ -150,7 +140,7 @@ def _between(depth: FloatArray, max_step: float) -> tuple[FloatArray, FloatArray
         is_one = np.abs(a - b) <= max_step
         total[is_one] += 0.5 * (a + b)[is_one]
         count += is_one
-    return total / np.maximum(count, 1), count
+    return np.where(np.isnan(depth) & (count > 0), total / np.maximum(count, 1), depth)
 
 
 def _surface(
