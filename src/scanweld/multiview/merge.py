@@ -182,7 +182,11 @@ def is_near(p: Pose, q: Pose, middle: FloatArray, near: tuple[float, float]) -> 
 def _judged(
     a: Poses, b: Poses, a_from_b: Pose, supports: tuple[Support, ...], judge: Judge
 ) -> Merge:
-    evidence = [judge(i, j, a[i].inverse() @ a_from_b @ b[j]) for i in sorted(a) for j in sorted(b)]
+    from_a = {i: a[i].inverse() for i in sorted(a)}
+    moved = {j: a_from_b @ b[j] for j in sorted(b)}
+    evidence = [
+        judge(i, j, i_from_a @ pose) for i, i_from_a in from_a.items() for j, pose in moved.items()
+    ]
     violated = [e.surface_violation for e in evidence]
     return Merge(
         a_from_b=a_from_b,
