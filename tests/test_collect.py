@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scanweld.errors import InputError, ReadError
-from scanweld.io import collect, natural_key
+from scanweld.io import collect, natural_key, read_scan
 
 
 @pytest.fixture
@@ -31,6 +31,13 @@ def test_a_folder_gives_its_scans_in_natural_order(folder: Path) -> None:
     found = collect([folder])
     assert [scan.name for scan in found] == ["Scan1", "cloud", "mesh", "scan2", "scan10"]
     assert all(scan.path.parent == folder for scan in found)
+
+
+def test_a_link_to_nothing_is_left_for_the_reader_to_name(folder: Path) -> None:
+    (folder / "scan3.ply").symlink_to(folder / "gone.ply")
+    assert "scan3" in names_of(folder) and "scan3" in names_of(f"{folder}/scan*.ply")
+    with pytest.raises(ReadError, match=r"scan3\.ply: cannot be read"):
+        read_scan(folder / "scan3.ply")
 
 
 def test_a_pattern_is_a_folder_that_is_filtered(folder: Path) -> None:

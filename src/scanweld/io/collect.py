@@ -73,7 +73,8 @@ def _scans_among(candidates: list[Path], where: str, left_out: frozenset[str]) -
     scans: list[Path] = []
     for path in candidates:
         is_scan = path.suffix.lower() in known and not path.name.startswith(".")
-        if is_scan and path.is_file():
+        is_dangling = path.is_symlink() and not path.exists()
+        if is_scan and (path.is_file() or is_dangling):  # the reader says what is wrong with it
             scans.append(path)
         else:
             logger.debug("%s: no scan, left out", path)
