@@ -39,7 +39,7 @@ def refusal(tmp_path: Path, text: str) -> str:
     ],
 )
 def test_an_unknown_setting_is_named(tmp_path: Path, text: str, place: str):
-    assert f": {place}: " in refusal(tmp_path, text)
+    assert f": {place}: no such setting; " in refusal(tmp_path, text)
 
 
 @pytest.mark.parametrize(

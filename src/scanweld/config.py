@@ -189,4 +189,8 @@ def load_config(path: Path | None, **overrides: Any) -> Config:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(f"{path or 'settings'}: {where}: {first['msg']}") from error
+        wrong = "no such setting" if first["type"] == "extra_forbidden" else first["msg"]
+        raise ConfigError(
+            f"{path or 'settings'}: {where}: {wrong}; correct it (the config.toml of any run names "
+            "all settings)"
+        ) from error

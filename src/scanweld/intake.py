@@ -71,7 +71,7 @@ def take_in(
     if len(prepared) < 2:
         told = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
         raise InputError(
-            f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}, at least 2 are needed"
+            f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}; give at least 2"
             + (f" ({told})" if told else "")
         )
     prepared.sort(key=lambda scan: (scan.content_hash, scan.name))
