@@ -157,7 +157,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]):
         (["scans/a.ply"], r"only 1 of the scans"),
         (["scans/a.ply", "broken.ply"], r"only 1 of the scans"),
         (["scans", "--config", "missing.toml"], r"missing.toml: cannot be read"),
-        (["scans", "--config", "bad.toml"], r"bad.toml: pairs.num_turn: Extra inputs"),
+        (["scans", "--config", "bad.toml"], r"bad.toml: pairs.num_turn: no such setting"),
         (["scans", "--config", "odd.toml"], r"odd.toml: seed: "),
         (["scans", "-o", "scans"], r"scans: (is not empty|holds the input)"),
         (["scans", "-o", "scans", "--force"], r"scans: holds the input a.ply"),

@@ -57,7 +57,9 @@ def make_range_image(
         depth, _ = render_depth(points, faces, camera)
         # Points that lost returns have cut off from every face are surface too: without them the
         # silhouette shrinks, and right poses seem to lie in free space.
-        depth = np.where(np.isfinite(depth), depth, _splat(points, camera))
+        is_lonely = np.ones(len(points), dtype=bool)
+        is_lonely[faces] = False
+        depth = np.where(np.isfinite(depth), depth, _splat(points[is_lonely], camera))
     else:
         depth = _splat(points, camera)
     for _ in range(PINHOLE_ROUNDS):
