@@ -125,6 +125,7 @@ def test_the_report_names_every_pair_and_stage():
         else:
             assert pair.reason
     assert {"prepare", "features", "pairs", "graph", "refine", "fuse"} <= set(result.stages)
+    assert all(stage.counts for stage in result.stages.values())
 
 
 def test_workers_order_and_names_do_not_change_a_byte():

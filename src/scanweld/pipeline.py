@@ -97,7 +97,8 @@ def _describe(intake: Intake, config: Config, stages: Stages) -> list[Features |
 
 def _lay_out(intake: Intake, stages: Stages) -> list[ScanField]:
     """Every scan as the arrays that the pairs' kernels take."""
-    with stages.stage("lay out"):
+    with stages.stage("lay out") as counts:
+        counts["scans"] = len(intake.prepared)
         return stages.each(
             "lay out", lambda scan: make_field(scan, intake.diameter), intake.prepared
         )
