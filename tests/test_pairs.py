@@ -62,7 +62,7 @@ def swapped(pair: PreparedPair) -> PreparedPair:
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("gap", [30, 60])
+@pytest.mark.parametrize("gap", [30, 60, 90])
 def test_the_truth_is_found_from_any_start_pose(gap: float, model: CameraModel):
     pair, result = creature_pair(gap, model), creature_result(gap, model)
     degrees, shift = pair.off_by(best_pose(result))
@@ -70,13 +70,6 @@ def test_the_truth_is_found_from_any_start_pose(gap: float, model: CameraModel):
     assert result.kind is PairKind.GOOD and result.reason == ""
     assert result.best is not None and result.best.score > CONFIG.min_score
     assert 0 < result.rms < 0.003 * pair.diameter
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_at_a_right_angle_the_truth_is_found_or_nothing_is_claimed(model: CameraModel):
-    pair, result = creature_pair(90, model), creature_result(90, model)
-    degrees, shift = pair.off_by(best_pose(result))
-    assert result.kind is not PairKind.GOOD or (degrees < 1 and shift < 0.01)
 
 
 @pytest.mark.parametrize("keypoints", ["heat", "even"])
