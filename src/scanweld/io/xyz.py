@@ -54,7 +54,8 @@ def _drop_column_names(path: Path, lines: list[bytes]) -> None:
     """Blank the first line that holds anything, if it is made of names such as x y z."""
     first = next((k for k, line in enumerate(lines) if line.strip()), None)
     if first is not None and not any(is_number(word) for word in lines[first].split()):
-        logger.info("%s: column names %r skipped", path, lines[first].decode(errors="replace").strip())
+        names = lines[first].decode(errors="replace").strip()
+        logger.info("%s: column names %r skipped", path, names)
         lines[first] = b""
 
 
