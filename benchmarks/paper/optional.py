@@ -1,4 +1,4 @@
-"""Libraries that only the paper study needs, imported when they are first used."""
+"""Libraries that only the study compares with: the extra ``bench``."""
 
 from importlib import import_module
 from types import ModuleType
@@ -7,16 +7,12 @@ from scanweld.errors import InputError
 
 
 def need(module: str) -> ModuleType:
-    """Import an optional module, such as ``open3d``.
+    """A library of the extra ``bench``.
 
     Raises:
-        InputError: If it is not installed; the message says how to get it.
+        InputError: If it is not installed; the message says how to install it.
     """
     try:
         return import_module(module)
-    except ModuleNotFoundError as error:
-        if error.name != module.partition(".")[0]:
-            raise
-        raise InputError(
-            f"{error.name} is not installed: pip install 'scanweld[bench]' brings it"
-        ) from error
+    except ImportError as error:
+        raise InputError(f"{module} is not installed: run pip install 'scanweld[bench]'") from error
