@@ -16,6 +16,8 @@ from scanweld.errors import ConfigError
 Unit = Literal["m", "cm", "mm", "in"]
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
+Share = Annotated[float, Field(gt=0, le=1)]
+Pruning = Literal["self-occlusion", "observed", "predicted"]
 
 
 class Section(BaseModel):
@@ -82,6 +84,25 @@ class PairsConfig(Section):
     """Smallest over largest eigenvalue of the information matrix below which a pose slides."""
 
 
+class CoarseConfig(Section):
+    """Coarse registration as published (paper 3.1), for the method "paper" only.
+
+    The paper leaves open what is read here; the defaults are the reading that did best.
+    """
+
+    mutual: bool = False
+    """Whether matched signatures must be each other's nearest; as printed, only s asks (eq. 1)."""
+    max_signature_distance: float | None = Field(default=None, gt=0)
+    """Threshold of eq. 1: root mean square difference of the log signatures. By the quantile if
+    None."""
+    signature_quantile: float = Field(default=0.5, gt=0, le=1)
+    """The threshold of eq. 1 as a quantile of the matches' distances; 1 keeps all."""
+    icp: Literal["keypoints", "surface"] = "surface"
+    """What the ICP aligns: the matched keypoints alone, or the scans' surfaces."""
+    trim: Share | Literal["auto"] | None = None
+    """Share of the closest points that the ICP goes by, or "auto"; all if None."""
+
+
 class GraphConfig(Section):
     """Pairs -> poses of all scans that can be placed."""
 
@@ -107,23 +128,35 @@ class GraphConfig(Section):
 
 
 class ContoursConfig(Section):
-    """MM-ICC (paper 3.2).
+    """M-ICC and MM-ICC (paper 3.2).
 
-    A run takes its contour sets and prunings into the joint refinement; ``trim`` and what follows
-    are for two scans aligned by contours alone (``contours.mm_icc.refine_pair``).
+    A run takes its contour sets and prunings into the joint refinement; ``matching`` and what
+    follows are for views aligned by contours alone (``contours.mm_icc``, ``contours.m_icc``).
     """
 
     jump_pixels: float = Field(default=5.0, gt=1)
     """Depth steps tau_1 = tau_2 of the contour sets (eqs 2, 3), in footprints."""
+    prunings: tuple[Pruning, ...] = ("self-occlusion", "observed", "predicted")
+    """Which prunings are made: the first (eq. 4), the second (eq. 5), the third (eq. 6)."""
+    self_occlusion: Literal["border", "place"] = "border"
+    """What eq. 4 takes away: predicted contours seen on triangles at the rim of their own scan, or
+    those at the same place in space as its contours."""
+    predicted_visibility: Literal["face", "depth", "observed normal", "printed"] = "face"
+    """What eq. 6 asks of a predicted contour point: that the rendered face looks towards camera j,
+    that it is not behind what j observed, that the surface observed by j in its pixel looks towards
+    camera j, or (as printed) towards camera i."""
+    matching: Literal["trimmed", "mutual"] = "trimmed"
+    """Closest observed points, the farthest left out (MM-ICC), or only pairs of points that are
+    closest to each other (M-ICC)."""
     trim: float | None = Field(default=None, gt=0, le=1)
     """Share of the contour matches that trimmed ICP keeps; found anew in each step if None."""
     num_renders: int = Field(default=20, ge=1)
     """Outer iterations: predicted range images are rendered anew in each."""
     num_steps: int = Field(default=3, ge=1)
     """Inner iterations between two renderings."""
-    residual: Literal["point", "normal"] = "normal"
-    """Distance of contours in 3D, as published, or that followed by their distance across the
-    outline in the image, which is unbiased."""
+    residual: Literal["point", "image", "normal"] = "normal"
+    """What is minimised: the distance of contours in 3D (MM-ICC), in the image (M-ICC), or that in
+    3D followed by the distance across the outline in the image, which is unbiased."""
 
 
 class RefineConfig(Section):
@@ -161,6 +194,7 @@ class Config(Section):
     prepare: PrepareConfig = PrepareConfig()
     heat: HeatConfig = HeatConfig()
     pairs: PairsConfig = PairsConfig()
+    coarse: CoarseConfig = CoarseConfig()
     graph: GraphConfig = GraphConfig()
     contours: ContoursConfig = ContoursConfig()
     refine: RefineConfig = RefineConfig()
