@@ -56,6 +56,14 @@ class HeatConfig(Section):
     """Longest diffusion time, in squared diameters."""
     group_diameters: float = Field(default=0.05, gt=0)
     """Keypoints nearer than this, with like signatures, become one."""
+    surface: Literal["closed", "open", "clamped"] = "closed"
+    """What heat spreads on: the front closed by walls and a back plane, as published; the front
+    alone, whose rims let no heat out, or keep cold."""
+    jumps: Literal["cut", "bridged"] = "cut"
+    """Whether the front is cut at depth jumps, or goes on across them."""
+    times: Literal["resolved", "sun"] = "resolved"
+    """Diffusion times as above, or those of Sun et al.: 4 ln 10 over the last and first
+    eigenvalues."""
 
 
 class PairsConfig(Section):

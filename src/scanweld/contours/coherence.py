@@ -10,10 +10,14 @@ from scanweld.config import ContoursConfig
 from scanweld.contours.contour_sets import ContourPoints, ObservedContours, observe_contours
 from scanweld.contours.predict import predict_contours
 from scanweld.contours.prune import (
+    prune_behind,
+    prune_by_observed_normal,
     prune_invisible_observed,
     prune_invisible_predicted,
+    prune_same_place,
     prune_self_occlusion,
 )
+from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
@@ -42,14 +46,43 @@ class ContourPair:
     observed: ContourPoints
 
 
-def contour_pair(i: ObservedContours, j: ObservedContours, j_from_i: Pose) -> ContourPair:
+def contour_pair(
+    i: ObservedContours, j: ObservedContours, j_from_i: Pose, config: ContoursConfig
+) -> ContourPair:
     """Render scan i into camera j and prune the contours of both (paper eqs 4-6)."""
-    camera_i, camera_j = i.scan.image.camera, j.scan.image.camera
     predicted, corners = predict_contours(i, j, j_from_i)
-    kept = prune_self_occlusion(corners, i.is_border)
-    kept &= prune_invisible_predicted(predicted, camera_j)
-    seen = prune_invisible_observed(j.contour, camera_i, j_from_i)
-    return ContourPair(predicted=predicted[kept], observed=j.contour[seen])
+    observed = j.contour
+    kept = np.ones(len(predicted), dtype=bool)
+    if "self-occlusion" in config.prunings:
+        if config.self_occlusion == "border":
+            kept &= prune_self_occlusion(corners, i.is_border)
+        else:
+            kept &= prune_same_place(predicted, i, j_from_i)
+    if "predicted" in config.prunings:
+        kept &= _visible(predicted, i, j, j_from_i, config)
+    if "observed" in config.prunings:
+        observed = observed[prune_invisible_observed(observed, i.scan.image.camera, j_from_i)]
+    return ContourPair(predicted=predicted[kept], observed=observed)
+
+
+def _visible(
+    predicted: ContourPoints,
+    i: ObservedContours,
+    j: ObservedContours,
+    j_from_i: Pose,
+    config: ContoursConfig,
+) -> BoolArray:
+    """The third pruning in the reading that is asked for."""
+    camera_i, camera_j = i.scan.image.camera, j.scan.image.camera
+    match config.predicted_visibility:
+        case "face":
+            return prune_invisible_predicted(predicted, camera_j)
+        case "depth":
+            return prune_behind(predicted, j)
+        case "observed normal":
+            return prune_by_observed_normal(predicted, j, camera_j, Pose.identity())
+        case "printed":
+            return prune_by_observed_normal(predicted, j, camera_i, j_from_i)
 
 
 def coherence(pairs: Sequence[ContourPair]) -> float:
@@ -100,7 +133,7 @@ def contour_matcher(
 
     def match(i: int, j: int, j_from_i: Pose) -> Matches:
         image = scans[j].image
-        pair = contour_pair(observed[i], observed[j], j_from_i)
+        pair = contour_pair(observed[i], observed[j], j_from_i, config)
         return outline_matches(pair, image.camera, LAST_MATCH_PIXELS * image.pixel)
 
     return match

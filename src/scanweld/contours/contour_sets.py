@@ -43,12 +43,14 @@ class ObservedContours:
         jump: Depth step that makes a contour, tau_1 = tau_2, as a length.
         contour: The visible contour C_i (eq. 2).
         is_border: (V,) mesh vertices on C_i, on O_i (eq. 3) or on the open border of the mesh.
+        jumps: (N, 3) points of C_i and O_i.
     """
 
     scan: PreparedScan
     jump: float
     contour: ContourPoints
     is_border: BoolArray
+    jumps: FloatArray
 
 
 def observe_contours(scan: PreparedScan, config: ContoursConfig) -> ObservedContours:
@@ -57,9 +59,10 @@ def observe_contours(scan: PreparedScan, config: ContoursConfig) -> ObservedCont
     near = near_side(image.depth, image.kind == PixelKind.FREE, jump)
     far = far_side(image.depth, jump)
     rows, columns = np.nonzero(near)
+    points = image.points()
     contour = ContourPoints(
         pixels=np.stack([columns, rows], axis=1),
-        points=image.points()[near],
+        points=points[near],
         normals=image.normals[near],
     )
     on_jump = (near | far)[np.isfinite(image.depth)]
@@ -68,6 +71,7 @@ def observe_contours(scan: PreparedScan, config: ContoursConfig) -> ObservedCont
         jump=jump,
         contour=contour,
         is_border=on_jump | border_vertices(scan.mesh.faces, len(scan.mesh.vertices)),
+        jumps=points[near | far],
     )
 
 
