@@ -10,9 +10,14 @@ def need(module: str) -> ModuleType:
     """A library of the extra ``bench``.
 
     Raises:
-        InputError: If it is not installed; the message says how to install it.
+        InputError: If it is not installed, or needs a library of the system that is not there
+            (Open3D: libusb, libGL, libX11); the message says how to install it.
     """
     try:
         return import_module(module)
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise InputError(f"{module} is not installed: run pip install 'scanweld[bench]'") from error
+    except ImportError as error:
+        raise InputError(
+            f"{module} cannot be loaded ({error}): install that library with the system's packages"
+        ) from error

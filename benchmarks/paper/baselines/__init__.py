@@ -1,0 +1,1 @@
+"""The methods of the study: those of libraries, and the project's own, behind one signature."""

@@ -1,0 +1,206 @@
+"""Virtual scans with the keypoints of all detectors, and all descriptors at any of their points."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
+
+from benchmarks.paper.baselines.fpfh import FEATURE_VOXELS, VOXEL
+from benchmarks.paper.optional import need
+from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan
+from scanweld.config import HeatConfig
+from scanweld.evaluation.full_mesh_hks import (
+    full_mesh_hks,
+    full_mesh_keypoints,
+    full_mesh_spectrum,
+)
+from scanweld.evaluation.harris3d import harris_keypoints
+from scanweld.evaluation.si_hks import octave_times, si_heat_signature
+from scanweld.evaluation.spectrum import Spectrum, spectrum_of, values_at
+from scanweld.evaluation.wks import energy_bands, wave_distances, wave_signature
+from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.scan import principal_diameter
+from scanweld.heat import Features, describe
+from scanweld.heat.artificial_mesh import close_front
+from scanweld.heat.front import thin_front
+from scanweld.heat.signature import diffusion_times, heat_signature
+
+DETECTORS = ("PA-HKS", "HKS, full mesh", "3D Harris", "random points")
+DETECTOR_OF = {
+    "PA-HKS": "PA-HKS",
+    "SI-HKS": "PA-HKS",
+    "WKS": "PA-HKS",
+    "HKS, full mesh": "HKS, full mesh",
+    "FPFH": "3D Harris",
+}
+"""Descriptor -> the detector whose keypoints it describes; some come without one."""
+DESCRIPTORS = tuple(DETECTOR_OF)
+
+_SEEN_PIXELS = 4.0
+"""How far a point may lie before or behind the surface that a scan shows at its pixel."""
+_HARRIS_RADIUS = 0.03
+_SPACING = 0.05
+"""In diameters, as PA-HKS's keypoints."""
+_HARRIS_STRIDE = 2
+"""Every so-many-th row and column of the image may hold a keypoint."""
+_SCALES = (2.0**-12, 2.0**3)
+"""Window of SI-HKS, in squared diameters: its derivative vanishes at both ends."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class FeatureView:
+    """A virtual scan with what its features are made of; sensor frame.
+
+    Attributes:
+        virtual: The scan.
+        features: Its PA-HKS keypoints.
+        front: Eigenpairs of its artificial mesh, on the front's vertices.
+        keypoints: Of each detector, (K, 3).
+    """
+
+    virtual: VirtualScan
+    features: Features
+    front: Spectrum
+    keypoints: dict[str, FloatArray]
+
+
+@lru_cache(maxsize=16)
+def feature_view(name: str, azimuth_deg: float, roll_deg: float) -> FeatureView:
+    """Scan an object from the side and find the keypoints of all detectors."""
+    virtual = virtual_scan(name, azimuth_deg, roll_deg=roll_deg)
+    scan, config = virtual.scan, HeatConfig()
+    features = describe(scan, config)
+    num = len(features.points)
+    rng = np.random.default_rng([round(azimuth_deg), 3])
+    samples = scan.samples.points
+    return FeatureView(
+        virtual=virtual,
+        features=features,
+        front=_front_spectrum(scan, config),
+        keypoints={
+            "PA-HKS": features.points,
+            "HKS, full mesh": _full_mesh_keypoints_in(name, virtual),
+            "3D Harris": _harris_keypoints_in(scan, num),
+            "random points": samples[rng.choice(len(samples), num, replace=False)],
+        },
+    )
+
+
+def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
+    """Which points (N, 3), sensor frame, lie on the surface that the scan shows."""
+    pixels, depth = scan.image.camera.project(points)
+    columns, rows = np.rint(pixels).astype(np.int64).T
+    height, width = scan.image.depth.shape
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    shown = scan.image.depth[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
+    return inside & (np.abs(shown - depth) < _SEEN_PIXELS * scan.image.pixel)
+
+
+def distances(descriptor: str, name: str, views: Any, points: Any) -> FloatArray:
+    """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another.
+
+    Args:
+        descriptor: One of ``DESCRIPTORS``.
+        name: Of the object.
+        views: Two of them.
+        points: Of each, sensor frames.
+
+    Raises:
+        InputError: If the library that computes the descriptor is missing.
+    """
+    of = _DESCRIBE[descriptor]
+    one, other = (of(name, view, at) for view, at in zip(views, points, strict=True))
+    return wave_distances(one, other) if descriptor == "WKS" else cdist(one, other)
+
+
+def _pa_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+    spectrum, config = view.front, HeatConfig()
+    times = diffusion_times(spectrum.eigenvalues, config.num_times, config.longest_time_diameters2)
+    signature = heat_signature(spectrum.eigenvalues, spectrum.functions, times)
+    return values_at(signature, spectrum.points, points)
+
+
+def _si_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+    spectrum = view.front
+    signature = si_heat_signature(spectrum.eigenvalues, spectrum.functions, octave_times(*_SCALES))
+    return values_at(signature, spectrum.points, points)
+
+
+def _wks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+    spectrum = view.front
+    bands, width = energy_bands(spectrum.eigenvalues)
+    signature = wave_signature(spectrum.eigenvalues, spectrum.functions, bands, width)
+    return values_at(signature, spectrum.points, points)
+
+
+def _full_mesh_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+    vertices, signature, _ = _full_mesh(name)
+    return values_at(signature, vertices, view.virtual.world_from_sensor.apply(points))
+
+
+def _fpfh(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+    """Fast point feature histograms (Rusu et al. 2009), as the pair methods use them."""
+    library = need("open3d")
+    diameter, mesh = view.virtual.diameter, view.virtual.scan.mesh
+    cloud = library.geometry.PointCloud(library.utility.Vector3dVector(mesh.vertices / diameter))
+    cloud.normals = library.utility.Vector3dVector(np.array(mesh.normals))
+    cloud = cloud.voxel_down_sample(VOXEL)
+    around = library.geometry.KDTreeSearchParamHybrid(radius=FEATURE_VOXELS * VOXEL, max_nn=100)
+    found = library.pipelines.registration.compute_fpfh_feature(cloud, around)
+    _, nearest = KDTree(np.asarray(cloud.points)).query(points / diameter)
+    return np.asarray(found.data).T[nearest]
+
+
+_DESCRIBE: dict[str, Callable[[str, FeatureView, FloatArray], FloatArray]] = {
+    "PA-HKS": _pa_hks,
+    "SI-HKS": _si_hks,
+    "WKS": _wks,
+    "HKS, full mesh": _full_mesh_hks,
+    "FPFH": _fpfh,
+}
+
+
+def _front_spectrum(scan: PreparedScan, config: HeatConfig) -> Spectrum:
+    front = thin_front(scan.image, config.max_front_vertices)
+    mesh = close_front(front, scan.image.camera, scan.diameter)
+    whole = spectrum_of(mesh.vertices, mesh.faces, scan.diameter, config.num_modes)
+    return Spectrum(
+        points=front.points,
+        eigenvalues=whole.eigenvalues,
+        functions=whole.functions[: mesh.num_front],
+    )
+
+
+@lru_cache
+def _full_mesh(name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Vertices of the thinned mesh, their signatures, and the places of its keypoints; world."""
+    mesh = mesh_of(name)
+    spectrum, faces = full_mesh_spectrum(mesh)
+    signature = full_mesh_hks(spectrum)
+    at = full_mesh_keypoints(spectrum, faces, signature, principal_diameter(mesh.vertices))
+    return spectrum.points, signature, spectrum.points[at]
+
+
+def _full_mesh_keypoints_in(name: str, virtual: VirtualScan) -> FloatArray:
+    _, _, keypoints = _full_mesh(name)
+    points = virtual.world_from_sensor.inverse().apply(keypoints)
+    return points[is_seen(points, virtual.scan)]
+
+
+def _harris_keypoints_in(scan: PreparedScan, max_count: int) -> FloatArray:
+    """The strongest corners of a scan's surface, away from its rims."""
+    image = scan.image
+    rows, columns = np.nonzero(np.isfinite(image.depth))
+    is_rim = image.is_rim[rows, columns]
+    on_grid = (rows % _HARRIS_STRIDE == 0) & (columns % _HARRIS_STRIDE == 0)
+    points, radius = scan.mesh.vertices, _HARRIS_RADIUS * scan.diameter
+    at = np.flatnonzero(on_grid & ~is_rim)
+    # A neighbourhood cut in half by a rim bends where the surface does not.
+    from_rim, _ = KDTree(points[is_rim]).query(points[at])
+    at = at[from_rim > 0.5 * radius]
+    return points[harris_keypoints(points, at, radius, _SPACING * scan.diameter, max_count)]
