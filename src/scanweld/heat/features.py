@@ -10,11 +10,11 @@ from scipy.spatial import KDTree
 from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from scanweld.geometry.prepared import PreparedScan, RangeImage
-from scanweld.heat.artificial_mesh import close_front
 from scanweld.heat.front import FrontMesh, thin_front
 from scanweld.heat.keypoints import group, persistent_maxima
 from scanweld.heat.laplacian import eigenpairs
-from scanweld.heat.signature import diffusion_times, heat_signature
+from scanweld.heat.signature import diffusion_times, heat_signature, sun_times
+from scanweld.heat.surface import heat_surface
 
 _VERTICES_PER_MODE = 2
 """A front of fewer vertices than this many times the modes does not resolve them."""
@@ -64,18 +64,21 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
     A scan whose surface is too small for the modes, or whose eigenproblem is not solved, gets
     none; the log says why.
     """
-    front = thin_front(scan.image, config.max_front_vertices)
+    front = thin_front(scan.image, config.max_front_vertices, bridged=config.jumps == "bridged")
     if len(front.points) < _VERTICES_PER_MODE * config.num_modes:
         logger.info("%s: no heat keypoints, only %d vertices", scan.name, len(front.points))
         return _no_features(config.num_times)
-    mesh = close_front(front, scan.image.camera, scan.diameter)
+    mesh = heat_surface(front, scan.image.camera, scan.diameter, config.surface)
+    if len(mesh.vertices) - len(mesh.cold) <= config.num_modes:
+        logger.info("%s: no heat keypoints, too few vertices off the rims", scan.name)
+        return _no_features(config.num_times)
     vertices = (mesh.vertices - mesh.vertices.mean(axis=0)) / scan.diameter
     try:
-        eigenvalues, functions = eigenpairs(vertices, mesh.faces, config.num_modes)
+        eigenvalues, functions = eigenpairs(vertices, mesh.faces, config.num_modes, mesh.cold)
     except ArpackError as error:
         logger.warning("%s: no heat keypoints, eigenproblem not solved (%s)", scan.name, error)
         return _no_features(config.num_times)
-    times = diffusion_times(eigenvalues, config.num_times, config.longest_time_diameters2)
+    times = _times(eigenvalues, config)
     signature = heat_signature(eigenvalues, functions, times)
     # Heat on walls and back says where the sensor stood: only the front's own maxima are taken.
     surface = signature[: mesh.num_front]
@@ -95,6 +98,12 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
         times=times,
         found_at=front.points[found[chosen]],
     )
+
+
+def _times(eigenvalues: FloatArray, config: HeatConfig) -> FloatArray:
+    if config.times == "sun":
+        return sun_times(eigenvalues, config.num_times)
+    return diffusion_times(eigenvalues, config.num_times, config.longest_time_diameters2)
 
 
 def _move_off_rims(

@@ -45,18 +45,20 @@ class FrontMesh:
         put("quads", frozen(self.quads, np.int64, (None, None, 4)))
 
 
-def thin_front(image: RangeImage, max_vertices: int) -> FrontMesh:
+def thin_front(image: RangeImage, max_vertices: int, *, bridged: bool = False) -> FrontMesh:
     """The surface of a range image on every n-th row and column, n as small as the limit allows.
 
-    Two pixels of the thinned grid are joined only where the full image shows no jump between them.
-    Dropouts of a pixel or two are bridged; small pieces are left out. The mesh may be empty.
+    Two pixels of the thinned grid are joined only where the full image shows no jump between them,
+    unless jumps are bridged, too. Dropouts of a pixel or two always are; small pieces are left out.
+    The mesh may be empty.
     """
     depth = _bridge_dropouts(image.depth, _JUMP_PIXELS * image.pixel)
     points = image.camera.unproject_image(depth)
+    jump = np.inf if bridged else _JUMP_PIXELS * image.pixel
     for stride in count(1):
         if np.isfinite(depth[::stride, ::stride]).sum() > max_vertices:
             continue
-        front = _mesh_grid(points, depth, stride, _JUMP_PIXELS * image.pixel)
+        front = _mesh_grid(points, depth, stride, jump)
         if len(front.points) <= max_vertices:
             return front
     raise AssertionError("unreachable: a stride beyond the image leaves one pixel")

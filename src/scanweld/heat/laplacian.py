@@ -13,16 +13,18 @@ _START_SEED = 20
 
 
 def eigenpairs(
-    vertices: FloatArray, faces: IntArray, num_modes: int
+    vertices: FloatArray, faces: IntArray, num_modes: int, cold: IntArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest eigenvalues (K,) of -Laplace phi = lambda phi and functions (V, K), ascending.
 
-    The functions have unit norm under the mesh's area. Shift-invert Lanczos from a fixed start.
+    The functions have unit norm under the mesh's area; nothing flows over open borders (Neumann).
+    Shift-invert Lanczos from a fixed start.
 
     Args:
         vertices: (V, 3), scaled to about unit size.
         faces: (F, 3).
         num_modes: K, constant modes included.
+        cold: Vertices (R,) at which all functions are zero (Dirichlet); none if not given.
 
     Raises:
         scipy.sparse.linalg.ArpackError: If the iteration fails or does not converge.
@@ -30,7 +32,19 @@ def eigenpairs(
     stiffness, mass = robust_laplacian.mesh_laplacian(vertices, faces)
     weight = diags_array(1.0 / np.sqrt(mass.diagonal()))
     operator = csc_array(weight @ stiffness @ weight)
-    n = len(vertices)
+    if cold is None or len(cold) == 0:
+        values, vectors = _smallest(operator, num_modes)
+        return values, weight @ vectors
+    warm = np.setdiff1d(np.arange(len(vertices)), cold)
+    values, vectors = _smallest(csc_array(operator[warm][:, warm]), num_modes)
+    everywhere = np.zeros((len(vertices), num_modes))
+    everywhere[warm] = vectors
+    return values, weight @ everywhere
+
+
+def _smallest(operator: csc_array, num_modes: int) -> tuple[FloatArray, FloatArray]:
+    """Smallest eigenvalues (K,) and orthonormal vectors (N, K) of a symmetric operator (N, N)."""
+    n = operator.diagonal().size
     factors = splu(
         csc_array(operator + _SHIFT * eye_array(n)),
         permc_spec="MMD_AT_PLUS_A",
@@ -41,4 +55,4 @@ def eigenpairs(
     inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)  # pyright: ignore[reportCallIssue]
     start = np.random.default_rng(_START_SEED).standard_normal(n)
     values, vectors = eigsh(operator, k=num_modes, sigma=-_SHIFT, v0=start, OPinv=inverse)
-    return np.maximum(values, 0.0), weight @ vectors
+    return np.maximum(values, 0.0), vectors

@@ -19,6 +19,15 @@ def diffusion_times(eigenvalues: FloatArray, num_times: int, longest: float) -> 
     return np.geomspace(shortest, max(longest, 2.0 * shortest), num_times)
 
 
+def sun_times(eigenvalues: FloatArray, num_times: int) -> FloatArray:
+    """Times (T,) of Sun et al. 2009, log-spaced from 4 ln 10 / lambda_k to 4 ln 10 / lambda_2.
+
+    lambda_2 is the first eigenvalue that is not zero.
+    """
+    first = eigenvalues[eigenvalues > _CONSTANT][0]
+    return 4.0 * np.log(10.0) / np.geomspace(eigenvalues[-1], first, num_times)
+
+
 def heat_signature(eigenvalues: FloatArray, functions: FloatArray, times: FloatArray) -> FloatArray:
     """Log of sum_i exp(-lambda_i t) phi_i(x)^2 over the heat trace sum_i exp(-lambda_i t): (V, T).
 
