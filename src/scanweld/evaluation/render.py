@@ -44,14 +44,14 @@ def render_shaded(
     Returns:
         (H, W, 3) picture on white.
     """
-    picture_from_world = _looking_from(np.asarray(direction, float), np.asarray(up, float))
+    picture_from_world = looking_from(np.asarray(direction, float), np.asarray(up, float))
     points = picture_from_world.apply(mesh.vertices)
     camera = _camera_around(points[np.unique(mesh.faces)], size * _OVERSAMPLING)
     depth, face_of = render_depth(points, mesh.faces, camera)
     seen = face_of >= 0
     picture = np.broadcast_to(_PAPER, (*depth.shape, 3)).copy()
     faces = mesh.faces[face_of[seen]]
-    shares = _barycentric(points[faces], camera.unproject_image(depth)[seen])
+    shares = barycentric(points[faces], camera.unproject_image(depth)[seen])
     flat = face_normals(points, faces)
     facing = flat[:, 2] / np.maximum(np.linalg.norm(flat, axis=1), np.finfo(float).tiny)
     light = np.abs(facing)
@@ -89,7 +89,7 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
-def _looking_from(direction: FloatArray, up: FloatArray) -> Pose:
+def looking_from(direction: FloatArray, up: FloatArray) -> Pose:
     """The picture's frame (x right, y down, z away from the viewer) from the world's."""
     away = -direction / np.linalg.norm(direction)
     right = np.cross(away, up)
@@ -116,7 +116,7 @@ def _camera_around(points: FloatArray, size: int) -> Camera:
     )
 
 
-def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
+def barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
     """Shares (N, 3) of the corners (N, 3, 3) of triangles in points (N, 3) on them, by (x, y)."""
     a, b, c = (corners[:, k, :2] for k in range(3))
     p = points[:, :2]

@@ -86,7 +86,7 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
         surface, front.points / scan.diameter, front.faces, config.group_diameters
     )
     reach = config.group_diameters * scan.diameter
-    anchors, is_kept = _move_off_rims(front, scan.image, maxima.vertices, reach)
+    anchors, is_kept = move_off_rims(front, scan.image, maxima.vertices, reach)
     found, strengths = maxima.vertices[is_kept], maxima.strengths[is_kept]
     chosen = group(front.points[anchors], surface[anchors], strengths, reach)
     rows, columns = front.pixels[anchors[chosen]].T
@@ -106,7 +106,7 @@ def _times(eigenvalues: FloatArray, config: HeatConfig) -> FloatArray:
     return diffusion_times(eigenvalues, config.num_times, config.longest_time_diameters2)
 
 
-def _move_off_rims(
+def move_off_rims(
     front: FrontMesh, image: RangeImage, at: IntArray, reach: float
 ) -> tuple[IntArray, BoolArray]:
     """The nearest front vertices that can be anchors, and which of the given ones (K,) have one.
