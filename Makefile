@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint clean benchmarks
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
@@ -15,6 +15,15 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+# The numbers of README.md and docs/benchmarks.md; needs the Stanford data, takes a quarter of an hour.
+benchmarks: $(VENV)/.installed-dev
+	rm -f docs/data/stress.json
+	$(BIN)/python benchmarks/run.py --seeds 3 --out docs/data/sets.json
+	$(BIN)/python benchmarks/pairs.py --seeds 3 --keypoints heat even mixed --out docs/data/pairs.json --plot docs/pairs.png
+	$(BIN)/python benchmarks/keypoints.py --out docs/data/keypoints.json
+	$(BIN)/python benchmarks/stress.py --few --seeds 1 --out docs/data/stress.json
+	$(BIN)/python benchmarks/pages.py
 
 clean:
 	rm -rf $(VENV) demo

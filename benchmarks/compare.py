@@ -3,11 +3,12 @@
 python benchmarks/compare.py A.json B.json
 """
 
-import json
 import sys
 from pathlib import Path
 from statistics import mean, stdev
 from typing import Any
+
+from results import read_results
 
 METRICS = (
     *("right", "wrong", "rotation_mean", "rotation_max"),
@@ -31,7 +32,7 @@ def main() -> int:
 
 
 def _runs(path: Path) -> dict[tuple[str, int], dict[str, Any]]:
-    return {(run["set"], run["seed"]): run for run in json.loads(path.read_text())["runs"]}
+    return {(run["set"], run["seed"]): run for run in read_results(path)["records"]}
 
 
 def _difference(pairs: list[tuple[float | None, float | None]]) -> str:

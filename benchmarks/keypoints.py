@@ -1,6 +1,6 @@
 """How repeatable PA-HKS keypoints are between virtual views of a mesh, as a Markdown table.
 
-Usage: python benchmarks/keypoints.py MESH [MESH ...]
+    python benchmarks/keypoints.py [MESH ...] --out keypoints.json
 
 A keypoint is repeated if the other view, which sees its place, has a keypoint within 3 % of the
 diameter of it. The chance level is the share of evenly spread samples for which that holds. Recall
@@ -9,12 +9,16 @@ at 8 is the share of repeated keypoints whose partner is among the 8 nearest sig
 
 import argparse
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import mean
+from typing import Any
 
 import numpy as np
 import trimesh
 
+from results import write_results
 from scanweld.config import HeatConfig, PrepareConfig
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import Axis, view_of
@@ -24,12 +28,17 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat import Features, describe
 from scanweld.prepare import prepare
+from sets import data_folder
 
 GAPS_DEG = (30, 50, 70, 90)
 AZIMUTHS_DEG = (0, 90, 180, 270)
 ELEVATION_DEG = 10
 RADIUS_DIAMETERS = 0.03
 NEAREST = 8
+COLUMNS = ("keypoints", "repeated", "repeated_chance", "recall", "recall_chance", "seconds")
+HEADINGS = (
+    *("mesh", "gap (deg)", "keypoints", "repeated", "chance", "recall at 8", "chance", "seconds"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,41 +52,45 @@ class Seen:
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("meshes", nargs="+", type=Path)
+    parser.add_argument("meshes", nargs="*", type=Path, help="default: those of the data")
     parser.add_argument("--up", default="y", choices=["x", "y", "z"])
+    parser.add_argument("--out", type=Path, help="JSON file of all comparisons of two views")
     arguments = parser.parse_args()
-    columns = [
-        "mesh",
-        "gap (deg)",
-        "keypoints",
-        "repeated",
-        "chance",
-        "recall at 8",
-        "chance",
-        "seconds",
-    ]
-    print("| " + " | ".join(columns) + " |")
-    print("|---" * len(columns) + "|")
-    for path in arguments.meshes:
-        loaded = trimesh.load_mesh(path, process=False)
-        mesh = TriangleMesh(vertices=loaded.vertices, faces=loaded.faces)
-        for gap, row in rows(mesh, arguments.up).items():
-            print(f"| {path.stem} | {gap} | " + " | ".join(f"{x:.2f}" for x in row) + " |")
+    data = data_folder(None) / "meshes"
+    meshes = arguments.meshes or [data / "armadillo.ply", data / "bunny.ply"]
+    compared = [one for path in meshes for one in comparisons(path, arguments.up)]
+    if arguments.out:
+        write_results(arguments.out, compared)
+    print("\n".join(table(compared)))
 
 
-def rows(mesh: TriangleMesh, up: Axis) -> dict[int, FloatArray]:
-    """Means for each gap: keypoints, repeatability and recall with their chance levels, seconds."""
-    table: dict[int, list[tuple[float, ...]]] = {gap: [] for gap in GAPS_DEG}
+def comparisons(path: Path, up: Axis) -> list[dict[str, Any]]:
+    """Both directions of all pairs of views of a mesh."""
+    loaded = trimesh.load_mesh(path, process=False)
+    mesh = TriangleMesh(vertices=loaded.vertices, faces=loaded.faces)
+    found = []
     for azimuth in AZIMUTHS_DEG:
         first = look(mesh, azimuth, up)
         for gap in GAPS_DEG:
             second = look(mesh, azimuth + gap, up)
-            count = len(second.features.points)
-            table[gap].append((count, *compare(first, second), second.seconds))
-            table[gap].append((count, *compare(second, first), second.seconds))
-    return {gap: np.nanmean(np.array(values), axis=0) for gap, values in table.items()}
+            for i, j in ((first, second), (second, first)):
+                found.append(
+                    {"mesh": path.stem, "azimuth": azimuth, "gap": gap, **compare(i, j)}
+                    | {"keypoints": len(j.features.points), "seconds": second.seconds}
+                )
+    return found
+
+
+def table(compared: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Markdown lines: means for each mesh and gap."""
+    lines = [f"| {' | '.join(HEADINGS)} |", "|" + "---|" * len(HEADINGS)]
+    for mesh, gap in dict.fromkeys((c["mesh"], c["gap"]) for c in compared):
+        of = [c for c in compared if (c["mesh"], c["gap"]) == (mesh, gap)]
+        cells = [f"{mean(c[k] for c in of if c[k] is not None):.2f}" for k in COLUMNS]
+        lines.append(f"| {mesh} | {gap} | {' | '.join(cells)} |")
+    return lines
 
 
 def look(mesh: TriangleMesh, azimuth_deg: float, up: Axis) -> Seen:
@@ -92,8 +105,8 @@ def look(mesh: TriangleMesh, azimuth_deg: float, up: Axis) -> Seen:
     )
 
 
-def compare(i: Seen, j: Seen) -> tuple[float, float, float, float]:
-    """Repeatability of i's keypoints in j, its chance level, recall at 8, its chance level."""
+def compare(i: Seen, j: Seen) -> dict[str, float | None]:
+    """Repeatability of i's keypoints in j and recall at 8, each with its chance level."""
     j_from_i = j.world_from_sensor.inverse() @ i.world_from_sensor
     radius = RADIUS_DIAMETERS * j.scan.diameter
     points = j_from_i.apply(i.features.points)
@@ -105,9 +118,12 @@ def compare(i: Seen, j: Seen) -> tuple[float, float, float, float]:
     apart = np.linalg.norm(i.features.signatures[:, None] - j.features.signatures[None], axis=-1)
     among = np.argsort(apart, axis=1, kind="stable")[:, :NEAREST]
     is_found: BoolArray = np.any(np.take_along_axis(is_near, among, axis=1), axis=1)
-    found = float(np.mean(is_found[repeated])) if repeated.any() else np.nan
-    share = NEAREST / len(j.features.points)
-    return repeated.sum() / is_seen(points, j.scan).sum(), chance, found, share
+    return {
+        "repeated": float(repeated.sum() / is_seen(points, j.scan).sum()),
+        "repeated_chance": chance,
+        "recall": float(np.mean(is_found[repeated])) if repeated.any() else None,
+        "recall_chance": NEAREST / len(j.features.points),
+    }
 
 
 def near(points: FloatArray, others: FloatArray, radius: float) -> BoolArray:

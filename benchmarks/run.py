@@ -16,11 +16,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import Any
 
+from results import write_results
 from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
 from scanweld.io import PoseSet, read_poses
 from sets import SETS, BenchmarkSet, Floors, Truth, data_folder, make_set
@@ -47,7 +47,7 @@ def main() -> int:
             runs.append(run)
             print(_progress_line(run), file=sys.stderr, flush=True)
             if options.out:
-                options.out.write_text(json.dumps(_document(options, runs), indent=1) + "\n")
+                write_results(options.out, runs)
     rows, is_passed = table(runs)
     print("\n".join(rows))
     return 0 if is_passed else 1
@@ -184,16 +184,6 @@ def _keep(out: Path, kept: Path) -> None:
 def _progress_line(run: dict[str, Any]) -> str:
     counts = ", ".join(f"{run[str(standing)]} {standing}" for standing in Standing)
     return f"{run['set']} seed {run['seed']}: {counts}, {run['verdict']}, {run['seconds']:.1f} s"
-
-
-def _document(options: argparse.Namespace, runs: list[dict[str, Any]]) -> dict[str, Any]:
-    return {
-        "format": 1,
-        "version": version("scanweld"),
-        "machine": {"system": platform.platform(), "cores": os.cpu_count()},
-        "workers": options.workers,
-        "runs": runs,
-    }
 
 
 def _options() -> argparse.Namespace:

@@ -190,3 +190,10 @@ SCENARIOS: Mapping[str, Scenario] = {
     ),
     "as points bunny": Scenario(body="bunny", views=SIX, disturbances=(as_points(),)),
 }
+
+FEW = (
+    *("ring 8", "ring 5", "random 8", "resolution 64", "noise 0.25%", "noise 1%", "outliers 20%"),
+    *("dropouts 30%", "flying pixels", "crop", "turntable", "2 of another object", "noise scan"),
+    *("mirrored", "duplicates", "cylinder", "box", "gear", "as points", "as grids"),
+)
+"""Some of each kind, for the documentation."""

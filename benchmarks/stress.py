@@ -8,7 +8,6 @@ are in another than the largest component. Runs in the output file already are n
 """
 
 import argparse
-import json
 import sys
 import time
 import traceback
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from results import read_results, write_results
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
 from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
@@ -25,7 +25,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet
 from scanweld.pipeline import run
 from scanweld.reconstruction import Reconstruction, ScanVerdict
-from scenarios import SCENARIOS, Scene, make_scene
+from scenarios import FEW, SCENARIOS, Scene, make_scene
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=100))
 """The defaults, but for a coarse model: only poses are looked at."""
@@ -46,7 +46,7 @@ def main() -> int:
             runs.append(run_scenario(name, seed, options))
             print(_progress_line(runs[-1]), file=sys.stderr, flush=True)
             if options.out:
-                options.out.write_text(json.dumps({"format": 1, "runs": runs}, indent=1) + "\n")
+                write_results(options.out, runs)
     shown = [r for r in runs if r["scenario"] in options.scenarios]
     print("\n".join(table(shown)))
     return int(any(r["wrong"] or r["verdict"] == "crash" for r in shown))
@@ -191,13 +191,20 @@ def _progress_line(run: dict[str, Any]) -> str:
 def _stored(out: Path | None) -> list[dict[str, Any]]:
     if out is None or not out.exists():
         return []
-    return list(json.loads(out.read_text(encoding="utf-8"))["runs"])
+    return list(read_results(out)["records"])
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), metavar="NAME"
+    )
+    parser.add_argument(
+        "--few",
+        dest="scenarios",
+        action="store_const",
+        const=list(FEW),
+        help="some of each kind: those of docs/benchmarks.md",
     )
     parser.add_argument("--seeds", type=int, default=3, help="how many (default: 3)")
     parser.add_argument("--first-seed", type=int, default=0)

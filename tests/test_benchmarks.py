@@ -26,7 +26,7 @@ def load(monkeypatch: pytest.MonkeyPatch):
         return importlib.import_module(name)
 
     yield import_module
-    for name in ("sets", "run", "compare", "pairs"):
+    for name in ("sets", "run", "compare", "pairs", "results"):
         sys.modules.pop(name, None)
 
 
@@ -86,8 +86,8 @@ def test_auc_counts_right_above_wrong(load: Any):
 
     def answer(score: float, rank: int | None) -> Any:
         return pairs.Answer(
-            object="o", seed=0, i="i", j="j", overlap=0.2, gap_deg=30.0, kind="good",
-            rotation_deg=0.0, translation_percent=0.0, score=score, evidence={}, margin=1.0,
+            anchors="mixed", object="o", seed=0, i="i", j="j", overlap=0.2, gap_deg=30.0,
+            kind="good", rotation_deg=0.0, translation_percent=0.0, score=score, evidence={}, margin=1.0,
             observability=1.0, rank=rank, seconds=0.1,
         )  # fmt: skip
 
