@@ -1,9 +1,8 @@
 """Virtual scans with the keypoints of all detectors, and all descriptors at any of their points."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -101,7 +100,9 @@ def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
     return inside & (np.abs(shown - depth) < _SEEN_PIXELS * scan.image.pixel)
 
 
-def distances(descriptor: str, name: str, views: Any, points: Any) -> FloatArray:
+def distances(
+    descriptor: str, name: str, views: Sequence[FeatureView], points: Sequence[FloatArray]
+) -> FloatArray:
     """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another.
 
     Args:
@@ -115,7 +116,9 @@ def distances(descriptor: str, name: str, views: Any, points: Any) -> FloatArray
     """
     of = _DESCRIBE[descriptor]
     one, other = (of(name, view, at) for view, at in zip(views, points, strict=True))
-    return wave_distances(one, other) if descriptor == "WKS" else cdist(one, other)
+    if descriptor == "WKS":
+        return wave_distances(one, other)
+    return cdist(one, other).astype(np.float64)
 
 
 def _pa_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
