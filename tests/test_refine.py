@@ -11,8 +11,8 @@ from scanweld.contours.coherence import contour_matcher
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.multiview.refine import Refinement, refine_poses
-from scanweld.multiview.refine_graph import refine_graph
+from scanweld.multiview.refine import Refinement, refine_poses, scan_rms
+from scanweld.multiview.refine_graph import Refined, refine_graph
 from scanweld.multiview.surface_terms import surface_matches, surface_source
 from scanweld.multiview.view_graph import Component, ViewGraph
 from scanweld.pairs.result import Alternative, Evidence
@@ -218,7 +218,12 @@ def test_a_refinement_is_taken_only_if_the_evidence_does_not_suffer(is_better: b
         return evidence(0.5 if (is_start.angle_deg() < 1e-9) == is_better else 0.6)
 
     matcher = contour_matcher(scans, ContoursConfig())
-    refined = refine_graph(graph, scans, matcher, judge, RefineConfig())
+
+    def refine(poses: Mapping[int, Pose], edges: Sequence[tuple[int, int]]) -> Refined:
+        found = refine_poses(scans, poses, edges, RefineConfig(), matcher)
+        return found.poses, scan_rms(found)
+
+    refined = refine_graph(graph, refine, judge)
     poses = refined.components[0].poses
     np.testing.assert_allclose(poses[1].matrix(), np.eye(4), atol=1e-12)
     if not is_better:

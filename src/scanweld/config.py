@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scanweld.errors import ConfigError
 
 Unit = Literal["m", "cm", "mm", "in"]
+Method = Literal["robust", "paper"]
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(gt=0, le=1)]
@@ -196,6 +197,9 @@ class Config(Section):
     seed: int = Field(default=0, ge=0)
     """Seed of everything random in a run. No stage draws random numbers as it stands, so that the
     scans' content and the other settings alone fix the output's bytes."""
+    method: Method = "robust"
+    """How poses are found: by the search from any start and the joint refinement ("robust"), or as
+    published, by PA-HKS matches with ICP and MM-ICC ("paper"); both are judged alike."""
     unit: Unit | None = None
     """Unit of the scans' coordinates; unknown if not given. It is passed on with the settings in
     the report, and nothing else depends on it."""

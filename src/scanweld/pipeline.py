@@ -1,41 +1,33 @@
 """Scans -> reconstruction: the method from top to bottom."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 from scanweld.config import Config
 from scanweld.contours.coherence import contour_matcher
-from scanweld.errors import InputError
-from scanweld.fusion.fuse import fuse
-from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
-from scanweld.heat.features import Features, describe
+from scanweld.heat.features import Features
 from scanweld.intake import Intake, take_in
 from scanweld.multiview.assemble import build_view_graph
 from scanweld.multiview.explain import find_doubts
-from scanweld.multiview.merge import Judge
-from scanweld.multiview.refine import ContourMatcher, refine_poses
-from scanweld.multiview.refine_graph import refine_graph
+from scanweld.multiview.refine import ContourMatcher, refine_poses, scan_rms
+from scanweld.multiview.refine_graph import Refined, refine_graph
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.outcome import conclude
 from scanweld.pairs.anchors import pair_anchors
-from scanweld.pairs.field import ScanField, make_field
+from scanweld.pairs.field import ScanField
 from scanweld.pairs.register import register_pair
-from scanweld.pairs.result import Evidence, PairResult
-from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.pairs.result import PairResult
 from scanweld.parallel import num_workers, single_threaded_algebra
 from scanweld.progress import Cache, NoCache, Progress, silent
+from scanweld.published import reconstruct_as_published
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
+from scanweld.steps import describe_scans, fuse_largest, lay_out, pair_judge
 
-logger = logging.getLogger(__name__)
-
-NUM_JUDGED_SAMPLES = 300
-"""Samples of a scan that judge merges and refinements: thousands of poses are asked about."""
 NUM_SETTLING_ROUNDS = 3
 """Rounds of refinement of a component that grows, so that chains of pairs do not drift."""
 
@@ -70,38 +62,28 @@ def run(
     stages = Stages(workers=num_workers(workers), cache=cache or NoCache(), progress=progress)
     with single_threaded_algebra():
         intake = take_in(scans, unreadable or {}, config, stages)
-        features = _describe(intake, config, stages)
-        fields = _lay_out(intake, stages)
-        contours = contour_matcher(intake.prepared, config.contours)
-        pairs = _register_pairs(intake, features, fields, contours, config, stages)
-        graph = _build_graph(intake, fields, pairs, config, stages)
-        graph = _refine(intake, fields, contours, graph, config, stages)
-        mesh = _fuse(intake, graph, config, stages)
-        return conclude(intake, features, fields, graph, mesh, config, stages.reports)
+        if config.method == "paper":
+            return reconstruct_as_published(intake, config, stages)
+        return _reconstruct(intake, config, stages)
 
 
-def _describe(intake: Intake, config: Config, stages: Stages) -> list[Features | None]:
-    """PA-HKS keypoints of every scan (paper 3.1), unless the settings do without."""
+def _reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstruction:
+    """The robust method: from any start, every pair searched and judged."""
+    features = _describe(intake, config, stages)
+    fields = lay_out(intake, stages)
+    contours = contour_matcher(intake.prepared, config.contours)
+    pairs = _register_pairs(intake, features, fields, contours, config, stages)
+    graph = _build_graph(intake, fields, pairs, config, stages)
+    graph = _refine(intake, fields, contours, graph, config, stages)
+    mesh = fuse_largest(intake, graph, config, stages)
+    return conclude(intake, features, fields, graph, mesh, config, stages.reports)
+
+
+def _describe(intake: Intake, config: Config, stages: Stages) -> Sequence[Features | None]:
+    """PA-HKS keypoints of every scan, unless the settings do without."""
     if config.pairs.keypoints == "even":
         return [None] * len(intake.prepared)
-    with stages.stage("features") as counts:
-        found = stages.each(
-            "features",
-            lambda scan: describe(scan, config.heat),
-            intake.prepared,
-            lambda scan: work_key("features", scan.content_hash, config.prepare, config.heat),
-        )
-        counts["keypoints"] = sum(len(f.points) for f in found)
-    return list(found)
-
-
-def _lay_out(intake: Intake, stages: Stages) -> list[ScanField]:
-    """Every scan as the arrays that the pairs' kernels take."""
-    with stages.stage("lay out") as counts:
-        counts["scans"] = len(intake.prepared)
-        return stages.each(
-            "lay out", lambda scan: make_field(scan, intake.diameter), intake.prepared
-        )
+    return describe_scans(intake, config, stages)
 
 
 def _register_pairs(
@@ -186,24 +168,13 @@ def _build_graph(
             pairs,
             [field.centre for field in fields],
             intake.diameter,
-            _pair_judge(fields, intake.diameter, config),
+            pair_judge(fields, intake.diameter, config),
             settle,
             config.graph,
         )
         counts["accepted"] = len(graph.accepted)
         counts["components"] = len(graph.components)
     return graph
-
-
-def _pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
-    """What gives the evidence on any pair of scans at any pose, by a few hundred samples each."""
-    tolerance = config.pairs.tolerance_diameters[2] * diameter
-
-    def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
-        both = judge(fields[i], fields[j], i_from_j, tolerance, NUM_JUDGED_SAMPLES)
-        return mean_evidence(*both)
-
-    return judge_pair
 
 
 def _refine(
@@ -215,32 +186,15 @@ def _refine(
     stages: Stages,
 ) -> ViewGraph:
     """Refine each component's poses together (paper 3.2), and doubt what comes out."""
-    judge_pair = _pair_judge(fields, intake.diameter, config)
+    judge_pair = pair_judge(fields, intake.diameter, config)
+
+    def refine(poses: Mapping[int, Pose], edges: Sequence[Edge]) -> Refined:
+        refined = refine_poses(intake.prepared, poses, edges, config.refine, contours)
+        return refined.poses, scan_rms(refined)
+
     with stages.stage("refine") as counts:
-        graph = refine_graph(graph, intake.prepared, contours, judge_pair, config.refine)
+        graph = refine_graph(graph, refine, judge_pair)
         graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     return graph
-
-
-def _fuse(intake: Intake, graph: ViewGraph, config: Config, stages: Stages) -> TriangleMesh | None:
-    """The surface of the largest component, in the scan frame of its reference; None without."""
-    if not graph.components:
-        return None
-    component = graph.components[0]
-    order = sorted(component.poses)
-    prepared = intake.prepared
-    world_from_reference = prepared[component.reference].scan_from_sensor
-    with stages.stage("fuse") as counts:
-        try:
-            mesh = fuse(
-                [prepared[k] for k in order],
-                [world_from_reference @ component.poses[k] for k in order],
-                config.fusion,
-            )
-        except InputError as error:
-            logger.warning("no model: %s", error)
-            return None
-        counts["faces"] = len(mesh.faces)
-    return mesh

@@ -47,6 +47,13 @@ class Sensor(StrEnum):
     ORTHOGRAPHIC = "orthographic"
 
 
+class MethodName(StrEnum):
+    """How poses are found."""
+
+    ROBUST = "robust"
+    PAPER = "paper"
+
+
 class LengthUnit(StrEnum):
     """What the scans' coordinates are measured in."""
 
@@ -69,6 +76,9 @@ Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Warnings only, no progress.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log.")]
+MethodOption = Annotated[
+    MethodName | None, typer.Option(help="robust (the default), or paper: as published.")
+]
 UnitOption = Annotated[LengthUnit | None, typer.Option(help="Unit of the scans' coordinates.")]
 
 
@@ -80,12 +90,18 @@ def run(
     workers: Workers = None,
     seed: Seed = None,
     unit: UnitOption = None,
+    method: MethodOption = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Register and fuse scans: poses, a model and a verdict."""
-    settings = load_config(config, seed=seed, unit=None if unit is None else unit.value)
+    settings = load_config(
+        config,
+        seed=seed,
+        unit=None if unit is None else unit.value,
+        method=None if method is None else method.value,
+    )
     try:
         with reporting(quiet=quiet, verbose=verbose) as progress:
             result = run_job(

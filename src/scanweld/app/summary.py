@@ -8,7 +8,8 @@ from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 
 def summary(result: Reconstruction, output: Path) -> str:
     """Verdict in a sentence, what could not be placed and why, and where the files are."""
-    lines = [f"{result.verdict.value}: {sentence(result)}"]
+    by = "" if result.config.method == "robust" else f" (method: {result.config.method})"
+    lines = [f"{result.verdict.value}: {sentence(result)}{by}"]
     lines += [f"  unplaced {name}: {reason}" for name, reason in _in_order(dict(result.unplaced))]
     doubtful = {
         name: scan.reason

@@ -77,7 +77,7 @@ def register_pair(
     alternatives = _ranked([alternative_at(field_i, field_j, to_pose(row), fine) for row in poses])
     if polish is not None:
         alternatives = _ranked(_polished(field_i, field_j, alternatives, polish, fine))
-    return _result(i, j, field_i, field_j, tuple(alternatives), diameter, config)
+    return result_of(i, j, field_i, field_j, tuple(alternatives), diameter, config)
 
 
 def _schedules(diameter: float) -> tuple[IcpSchedule, IcpSchedule]:
@@ -163,7 +163,7 @@ def _distinct(
     return poses[distinct_poses(poses, j.centre, angle, shift, count)]
 
 
-def _result(
+def result_of(
     i: int,
     j: int,
     field_i: ScanField,
@@ -172,6 +172,7 @@ def _result(
     diameter: float,
     config: PairsConfig,
 ) -> PairResult:
+    """The result of a pair from its distinct poses, the one to be judged first."""
     information, rms = np.zeros((6, 6)), float("nan")
     if alternatives:
         radius = config.tolerance_diameters[2] * diameter

@@ -48,6 +48,21 @@ def classify_pair(
     )
 
 
+def no_pose(i: int, j: int, reason: str) -> PairResult:
+    """The result of a pair of scans i < j for which there is no pose at all."""
+    return PairResult(
+        i=i,
+        j=j,
+        kind=PairKind.NO_OVERLAP,
+        reason=reason,
+        alternatives=(),
+        information=np.zeros((6, 6)),
+        observability=0.0,
+        margin=0.0,
+        rms=float("nan"),
+    )
+
+
 def _kind(
     alternatives: tuple[Alternative, ...], observability: float, margin: float, config: PairsConfig
 ) -> tuple[PairKind, str]:

@@ -1,0 +1,80 @@
+"""Steps that both methods take, each a stage of the run."""
+
+import logging
+from collections.abc import Sequence
+
+from scanweld.config import Config
+from scanweld.errors import InputError
+from scanweld.fusion.fuse import fuse
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.heat.features import Features, describe
+from scanweld.intake import Intake
+from scanweld.multiview.merge import Judge
+from scanweld.multiview.view_graph import ViewGraph
+from scanweld.pairs.field import ScanField, make_field
+from scanweld.pairs.result import Evidence
+from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.stages import Stages, work_key
+
+logger = logging.getLogger(__name__)
+
+NUM_JUDGED_SAMPLES = 300
+"""Samples of a scan that judge merges and refinements: thousands of poses are asked about."""
+
+
+def describe_scans(intake: Intake, config: Config, stages: Stages) -> list[Features]:
+    """PA-HKS keypoints of every scan (paper 3.1)."""
+    with stages.stage("features") as counts:
+        found = stages.each(
+            "features",
+            lambda scan: describe(scan, config.heat),
+            intake.prepared,
+            lambda scan: work_key("features", scan.content_hash, config.prepare, config.heat),
+        )
+        counts["keypoints"] = sum(len(f.points) for f in found)
+    return found
+
+
+def lay_out(intake: Intake, stages: Stages) -> list[ScanField]:
+    """Every scan as the arrays that the pairs' kernels take."""
+    with stages.stage("lay out") as counts:
+        counts["scans"] = len(intake.prepared)
+        return stages.each(
+            "lay out", lambda scan: make_field(scan, intake.diameter), intake.prepared
+        )
+
+
+def pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
+    """What gives the evidence on any pair of scans at any pose, by a few hundred samples each."""
+    tolerance = config.pairs.tolerance_diameters[2] * diameter
+
+    def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
+        both = judge(fields[i], fields[j], i_from_j, tolerance, NUM_JUDGED_SAMPLES)
+        return mean_evidence(*both)
+
+    return judge_pair
+
+
+def fuse_largest(
+    intake: Intake, graph: ViewGraph, config: Config, stages: Stages
+) -> TriangleMesh | None:
+    """The surface of the largest component, in the scan frame of its reference; None without."""
+    if not graph.components:
+        return None
+    component = graph.components[0]
+    order = sorted(component.poses)
+    prepared = intake.prepared
+    world_from_reference = prepared[component.reference].scan_from_sensor
+    with stages.stage("fuse") as counts:
+        try:
+            mesh = fuse(
+                [prepared[k] for k in order],
+                [world_from_reference @ component.poses[k] for k in order],
+                config.fusion,
+            )
+        except InputError as error:
+            logger.warning("no model: %s", error)
+            return None
+        counts["faces"] = len(mesh.faces)
+    return mesh
