@@ -40,6 +40,8 @@ _ENTRIES = (
     ),
     Entry(name="gicp", title="GICP", run=gicp.gicp, uses_start=True, needs=("small_gicp",)),
     Entry(name="cpd", title="CPD", run=cpd.cpd, uses_start=True, needs=("pycpd",)),
+    Entry(name="m-icc", title="M-ICC", run=own.m_icc, uses_start=True),
+    Entry(name="mm-icc", title="MM-ICC", run=own.mm_icc, uses_start=True),
     Entry(
         name="fpfh-ransac",
         title="FPFH + RANSAC + ICP",
@@ -55,6 +57,13 @@ _ENTRIES = (
         uses_start=False,
         needs=("kiss_matcher", "small_gicp"),
     ),
+    Entry(
+        name="paper-coarse",
+        title="the paper's coarse step",
+        run=own.paper_coarse,
+        uses_start=False,
+    ),
+    Entry(name="paper", title="the paper's method", run=own.paper, uses_start=False),
     Entry(name="default", title="scanweld", run=own.default, uses_start=False),
 )
 METHODS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.paper.baselines.records import Answer, ScanPair
+from benchmarks.paper.baselines.records import Answer, ScanPair, closeness
 from benchmarks.paper.optional import need
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
@@ -16,7 +16,7 @@ TOLERANCE = 1e-4
 
 
 def cpd(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """Rigid CPD (Myronenko and Song 2010); its score is the width it ends with, negative."""
+    """Rigid CPD (Myronenko and Song 2010); its score comes of the width it ends with."""
     moving, still = pair.j.samples.points[:NUM_POINTS], pair.i.samples.points[:NUM_POINTS]
     middle = still.mean(axis=0)
     target = (still - middle) / pair.diameter
@@ -28,7 +28,7 @@ def cpd(pair: ScanPair, start: Pose, seed: int) -> Answer:
     turn = drift.R.T  # its points are rows
     shift = pair.diameter * np.ravel(drift.t) + middle - turn @ middle
     moved = Pose(rotation=turn, translation=shift)
-    return Answer(i_from_j=moved @ start, score=-float(np.sqrt(drift.sigma2)))
+    return Answer(i_from_j=moved @ start, score=closeness(float(np.sqrt(drift.sigma2)), 1.0))
 
 
 def _without_scale(rigid: type) -> type:

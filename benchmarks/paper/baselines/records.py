@@ -30,7 +30,8 @@ class Answer:
 
     Attributes:
         i_from_j: The pose between the sensor frames; None where the method finds none.
-        score: The method's own confidence, always finite, higher is better; 0 where it has none.
+        score: The method's own confidence, finite and at least 0 but for the default's, higher is
+            better; 0 where there is no pose.
         reason: Why there is no pose, or what else the method says; empty where nothing.
         accepted: Whether the method vouches for the pose; None where it does not judge its own.
     """
@@ -43,6 +44,11 @@ class Answer:
     def __post_init__(self) -> None:
         if not np.isfinite(self.score):
             raise ValueError("a score is a finite number")
+
+
+def closeness(distance: float, diameter: float) -> float:
+    """A score of methods that minimise a distance: 1 at none, a half at 1 % of the diameter."""
+    return 1.0 / (1.0 + 100.0 * distance / diameter)
 
 
 Method = Callable[[ScanPair, Pose, int], Answer]
