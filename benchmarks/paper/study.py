@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from scanweld.errors import ScanweldError
 from scanweld.io.atomic import write_whole
 
 Unit = Mapping[str, Any]
@@ -21,6 +22,7 @@ _MEASURING = (
     "src/scanweld/**/*.py",
     *(
         "benchmarks/paper/views.py",
+        "benchmarks/paper/trial.py",
         "benchmarks/paper/methods.py",
         "benchmarks/paper/baselines/*.py",
     ),
@@ -82,10 +84,12 @@ class Study:
             advance: Told of (done, total) as units finish.
 
         Raises:
-            RuntimeError: If a unit fails; the finished ones are kept.
+            ScanweldError: If a unit lacks what the user has to bring.
+            RuntimeError: If a unit fails. The finished ones are kept.
         """
         units = table.units(self.quick)
-        keys = [_key(table, unit) for unit in units]
+        code = _code_digest(table)
+        keys = [_key(code, table, unit) for unit in units]
         store = self.work / f"{table.NAME}.jsonl"
         results = _stored(store)
         waiting = [(k, unit) for k, unit in zip(keys, units, strict=True) if k not in results]
@@ -146,13 +150,15 @@ def read_records(out: Path, name: str) -> list[Record]:
 
 def _result_of(future: "Future[Result]", table: Table, unit: Unit) -> Result:
     error = future.exception()
+    if isinstance(error, ScanweldError):
+        raise error
     if error is not None:
         raise RuntimeError(f"{table.NAME}: {dict(unit)}: {error}") from error
     return future.result()
 
 
-def _key(table: Table, unit: Unit) -> str:
-    told = json.dumps([_code_digest(table), table.NAME, unit], sort_keys=True)
+def _key(code: str, table: Table, unit: Unit) -> str:
+    told = json.dumps([code, table.NAME, unit], sort_keys=True)
     return hashlib.sha256(told.encode()).hexdigest()
 
 

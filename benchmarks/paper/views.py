@@ -107,8 +107,9 @@ def virtual_scan(
 @lru_cache(maxsize=1024)
 def overlap_of(name: str, azimuth_i: float, azimuth_j: float) -> float:
     """Overlap of two views of an object; rolls do not matter."""
-    views = [virtual_scan(name, azimuth).view for azimuth in (azimuth_i, azimuth_j)]
-    return overlap(mesh_of(name), *views)
+    mesh = mesh_of(name)
+    i, j = (view_of(mesh, a, pixels=PIXELS, up=UP[name]) for a in (azimuth_i, azimuth_j))
+    return overlap(mesh, i, j)
 
 
 def start_pose(kind: Start, i: VirtualScan, j: VirtualScan, seed: int) -> Pose:
