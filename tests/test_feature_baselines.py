@@ -1,10 +1,18 @@
 """Descriptors and keypoints that the study compares with PA-HKS, against analytic truth."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 
+from benchmarks.paper import features
+from benchmarks.paper.baselines import feature_views
+from benchmarks.paper.baselines.feature_views import DESCRIPTORS, DETECTORS
+from benchmarks.paper.features import QUESTIONS, answer
 from benchmarks.paper.optional import need
+from benchmarks.paper.study import Record
 from scanweld.errors import InputError
 from scanweld.evaluation.full_mesh_hks import (
     full_mesh_hks,
@@ -135,7 +143,7 @@ def test_scale_invariant_signature_of_a_sphere_follows_its_heat_trace():
 
 def test_wave_signature_is_one_on_the_whole_and_over_the_sphere():
     vertices, faces = ball(4)
-    spectrum = spectrum_of(vertices, faces, 1.0, 100)
+    spectrum = spectrum_of(vertices, faces, 1.0, 49)
     bands, width = energy_bands(spectrum.eigenvalues)
     signature = wave_signature(spectrum.eigenvalues, spectrum.functions, bands, width)
     assert signature.shape == (len(vertices), 100)
@@ -215,3 +223,60 @@ def test_a_missing_library_is_named_with_its_remedy():
     assert need("math").pi == pytest.approx(np.pi)
     with pytest.raises(InputError, match=r"pip install 'scanweld\[bench\]'"):
         need("no_such_library")
+
+
+def test_answers_count_what_is_right_among_what_is_asked():
+    """Three points ask; the last one's place is not seen, the middle one has no partner."""
+    apart = np.array([[0.1, 0.2, 0.9], [0.3, 0.1, 0.9], [0.9, 0.9, 0.0]])
+    is_right = np.array([[False, True, False], [False, False, False], [False, False, True]])
+    found = answer(apart, is_right, np.array([True, True, False]))
+    assert found["nearest"] == pytest.approx([0, 2, 1 / 3])
+    assert found["mutual"] == pytest.approx([0, 2, 1 / 3])
+    assert found["among 8"] == pytest.approx([1, 1, 1])
+    found = answer(apart, is_right, np.array([False, False, True]))
+    assert found["nearest"] == pytest.approx([1, 1, 1 / 3])
+    none = answer(np.zeros((0, 3)), np.zeros((0, 3), dtype=bool), np.zeros(0, dtype=bool))
+    assert none == {question: [0.0, 0.0, 0.0] for question in QUESTIONS}
+
+
+def test_a_random_descriptor_is_right_as_often_as_chance_says():
+    rng = np.random.default_rng(8)
+    total = {question: np.zeros(3) for question in QUESTIONS}
+    for _ in range(150):
+        is_right = rng.random((30, 40)) < 0.05
+        found = answer(rng.random((30, 40)), is_right, rng.random(30) < 0.7)
+        for question in QUESTIONS:
+            total[question] += found[question]
+    for right, asked, chance in total.values():
+        assert asked > 400
+        assert right == pytest.approx(chance, abs=4 * np.sqrt(chance))
+
+
+def test_features_are_measured_and_told(tmp_path: Path):
+    unit = features.units(quick=True)[0]
+    result = json.loads(json.dumps(features.measure(unit)))
+    repeated = {name: told["repeated"] for name, told in result["detectors"].items()}
+    assert tuple(repeated) == DETECTORS
+    right, asked, chance = repeated["HKS, full mesh"]
+    # The same places on the mesh, in both views.
+    assert right == asked > chance
+    assert repeated["PA-HKS"][0] > repeated["PA-HKS"][2]
+    for group in ("own", "even"):
+        assert tuple(result[group]) == DESCRIPTORS
+    right, asked, chance = result["even"]["HKS, full mesh"]["nearest"]
+    assert right / asked > 0.4 > 4 * chance / asked
+    told = features.page([Record(unit=unit, result=result)], tmp_path)
+    assert "| PA-HKS |" in told and "## Creature" in told
+    assert (tmp_path / "features.png").stat().st_size > 10_000
+
+
+def test_a_row_without_its_library_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def fail(module: str) -> None:
+        raise InputError(f"{module} is missing")
+
+    monkeypatch.setattr(feature_views, "need", fail)
+    unit = features.units(quick=True)[0]
+    result = features.measure(unit)
+    assert result["own"]["FPFH"] == {"missing": "open3d is missing"}
+    told = features.page([Record(unit=unit, result=result)], tmp_path)
+    assert "| FPFH | open3d is missing |" in told

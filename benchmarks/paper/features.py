@@ -1,6 +1,6 @@
 """Keypoint repeatability and descriptor precision against the gap between two views."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import comb
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from benchmarks.paper.baselines.feature_views import (
     feature_view,
     is_seen,
 )
-from benchmarks.paper.pages import markdown_table
+from benchmarks.paper.features_page import FEW, tell
 from benchmarks.paper.study import Record, Result, Unit
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import BoolArray, FloatArray
@@ -122,18 +122,23 @@ def _precision(pair: Pair, name: str, descriptor: str, points: Sequence[FloatArr
         return {"missing": str(error)}
     reach = RIGHT_DIAMETERS * pair[0].virtual.diameter
     is_right, (seen_i, seen_j) = _truth(pair, points, reach)
-    answers = (_asked(apart, is_right, seen_i), _asked(apart.T, is_right.T, seen_j))
+    answers = (answer(apart, is_right, seen_i), answer(apart.T, is_right.T, seen_j))
     return {
         question: [answers[0][question][k] + answers[1][question][k] for k in range(3)]
         for question in QUESTIONS
     }
 
 
-def _asked(apart: FloatArray, is_right: BoolArray, is_seen: BoolArray) -> dict[str, list[float]]:
-    """Right, asked and by chance right, for points (N,) that look for themselves among (M,).
+def answer(apart: FloatArray, is_right: BoolArray, is_seen: BoolArray) -> dict[str, list[float]]:
+    """Answers to ``QUESTIONS``, each as (right, asked, right by chance).
 
-    Of a random descriptor each answer is as likely: a share of right ones for the nearest, mutual
-    or not; for the nearest eight, one minus the chance that none of eight drawn is right.
+    Of a random descriptor each answer is as likely: the nearest, mutual or not, is right as often
+    as there are right ones, and the nearest eight hold one unless none of eight drawn is right.
+
+    Args:
+        apart: (N, M) distances of descriptors between points that ask and points that answer.
+        is_right: (N, M) whether they are the same place.
+        is_seen: (N,) whether the other view sees the place of one that asks.
     """
     num, others = apart.shape
     if num == 0 or others == 0:
@@ -160,21 +165,10 @@ def _counts(is_found: BoolArray, is_asked: BoolArray, chance: FloatArray) -> lis
     return [float(right), float(asked), float(chance[is_asked].sum())]
 
 
-def page(records: Sequence[Record], out: Path) -> str:
-    """The tables of each object, with a plot of them."""
-    _plot(records, out / f"{NAME}.png")
-    parts = [_INTRODUCTION, f"![Repeatability and precision against the gap]({NAME}.png)\n"]
-    for name in _objects(records):
-        parts.append(f"## {name.capitalize()}\n")
-        for heading, group, question in _TABLES:
-            parts.append(f"{heading}\n\n{_table(records, name, group, question)}")
-    return "\n".join(parts)
-
-
 _INTRODUCTION = f"""\
 Two virtual views of an object, 240 pixels across, without noise, the second camera rolled at
-random; each number is pooled over all azimuths and both directions of each pair. In parentheses:
-what chance alone would give.
+random; each number is pooled over all azimuths and both directions of each pair, a share, or a
+fraction where fewer than {FEW} were asked. In parentheses: what chance alone would give.
 
 - *Repeated*: keypoints whose place the other view sees that have a keypoint of the other view
   within {100 * REPEATED_DIAMETERS:g} % of the diameter. By chance: as many points in each view,
@@ -191,96 +185,8 @@ scan has: it sees the same surface from both sides, so that its keypoints repeat
 At evenly spread points ({NUM_EVEN} a view) all descriptors have the same task; the full mesh is
 their ceiling there: it cannot tell left from right, and no sample has its exact counterpart.
 """
-_TABLES = (
-    ("Keypoints, repeated", "detectors", "repeated"),
-    ("Descriptors at their keypoints, nearest", "own", "nearest"),
-    ("Descriptors at their keypoints, mutual", "own", "mutual"),
-    (f"Descriptors at their keypoints, among {NUM_NEAREST}", "own", "among 8"),
-    ("Descriptors at evenly spread points, nearest", "even", "nearest"),
-    ("Descriptors at evenly spread points, mutual", "even", "mutual"),
-    (f"Descriptors at evenly spread points, among {NUM_NEAREST}", "even", "among 8"),
-)
 
 
-def _objects(records: Iterable[Record]) -> list[str]:
-    return list(dict.fromkeys(record.unit["object"] for record in records))
-
-
-def _gaps(records: Iterable[Record]) -> list[int]:
-    return sorted({record.unit["gap"] for record in records})
-
-
-def _table(records: Sequence[Record], name: str, group: str, question: str) -> str:
-    gaps = _gaps(records)
-    first = records[0].result[group]
-    headings = ["keypoints" if group == "detectors" else "descriptor", *(f"{g}°" for g in gaps)]
-    if group == "detectors":
-        headings.append("a view")
-    rows = []
-    for entry in first:
-        row = [entry]
-        for gap in gaps:
-            right, asked, chance = _pooled(records, name, gap, (group, entry, question))
-            row.append(f"{right / asked:.2f} ({chance / asked:.2f})" if asked else "-")
-        if "missing" in first[entry]:
-            row[1:] = [first[entry]["missing"], *[""] * (len(gaps) - 1)]
-        if group == "detectors":
-            counts = [r.result[group][entry]["points"] for r in records if r.unit["object"] == name]
-            row.append(f"{np.mean(counts):.0f}")
-        rows.append(row)
-    return markdown_table(headings, rows)
-
-
-def _pooled(
-    records: Iterable[Record], name: str, gap: int, path: tuple[str, str, str]
-) -> FloatArray:
-    """Right, asked and by chance right (3,), over the azimuths."""
-    group, entry, question = path
-    total = np.zeros(3)
-    for record in records:
-        if record.unit["object"] == name and record.unit["gap"] == gap:
-            total += record.result[group][entry].get(question, [0, 0, 0])
-    return total
-
-
-def _plot(records: Sequence[Record], path: Path) -> None:
-    """Repeatability and mutual precision against the gap, chance dashed; a row an object."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    objects, gaps = _objects(records), _gaps(records)
-    panels = (("detectors", "repeated"), ("own", "mutual"), ("even", "mutual"))
-    titles = ("repeated keypoints", "right mutual matches, own keypoints", "same, evenly spread")
-    figure, axes = pyplot.subplots(
-        len(objects), len(panels), figsize=(13, 3.9 * len(objects)), squeeze=False, sharey=True
-    )
-    for row, name in zip(axes, objects, strict=True):
-        for axis, (group, question), title in zip(row, panels, titles, strict=True):
-            for entry in records[0].result[group]:
-                totals = np.array(
-                    [_pooled(records, name, gap, (group, entry, question)) for gap in gaps]
-                )
-                shares = totals[:, [0, 2]] / np.where(totals[:, 1:2] > 0, totals[:, 1:2], np.nan)
-                color, marker = _STYLE[entry]
-                axis.plot(gaps, shares[:, 0], color=color, marker=marker, label=entry)
-                axis.plot(gaps, shares[:, 1], color=color, lw=0.9, ls="--")
-            axis.set(title=f"{name}: {title}", xlabel="gap (deg)", ylim=(-0.03, 1.05), xticks=gaps)
-            axis.grid(alpha=0.25)
-            axis.legend(fontsize=8, loc="upper right")
-        row[0].set_ylabel("share (dashed: chance)")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
-
-
-_STYLE = {
-    "PA-HKS": ("#c0392b", "o"),
-    "SI-HKS": ("#e67e22", "s"),
-    "WKS": ("#b7950b", "^"),
-    "HKS, full mesh": ("#7f8c8d", "D"),
-    "FPFH": ("#2471a3", "v"),
-    "3D Harris": ("#2471a3", "v"),
-    "random points": ("#555555", "x"),
-}
+def page(records: Sequence[Record], out: Path) -> str:
+    """What all objects have in common, a plot, and the tables of each object."""
+    return f"{_INTRODUCTION}\n{tell(records, out / f'{NAME}.png')}"
