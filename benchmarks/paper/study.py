@@ -23,6 +23,7 @@ _MEASURING = (
     *(
         "benchmarks/paper/views.py",
         "benchmarks/paper/trial.py",
+        "benchmarks/paper/settings.py",
         "benchmarks/paper/methods.py",
         "benchmarks/paper/baselines/*.py",
     ),
