@@ -89,9 +89,8 @@ def methods_of(unit: Unit) -> tuple[str, ...]:
         if unit["azimuth"] in CPD_AZIMUTHS and unit["gap"] <= CPD_MAX_GAP:
             names = (*names, "cpd")
         names = (*names, *ELSEWHERE)
-    if unit["protocol"] == "identity":
-        names = tuple(name for name in names if name not in ELSEWHERE)
-    return names
+    left_out = ELSEWHERE if unit["protocol"] == "identity" else ("paper-coarse",)
+    return tuple(name for name in names if name not in left_out)
 
 
 def page(records: Sequence[Record], out: Path) -> str:

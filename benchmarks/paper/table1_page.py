@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.paper.lines import ORDER, draw_shares, dress
 from benchmarks.paper.methods import METHODS
 from benchmarks.paper.optional import need
 from benchmarks.paper.pages import markdown_table, percent
@@ -26,25 +27,7 @@ NEAR_GAP = 90
 OVERLAPS = ((0.15, 1.01, 0.95), (0.10, 0.15, 0.80), (0.0, 0.10, None))
 """From, below, and the share of pairs that must be right there."""
 PROTOCOL_TITLES = {"identity": "the paper's start", "random": "any start"}
-ORDER = (
-    *("icp", "trimmed-icp", "gicp", "cpd", "m-icc", "mm-icc", "paper-coarse", "paper"),
-    *("fpfh-ransac", "fgr", "kiss-gicp", "default"),
-)
 _PLOT = "table1.png"
-_COLORS = {
-    "default": "#1B6CA8",
-    "paper": "#C2274B",
-    "paper-coarse": "#E59AAA",
-    "mm-icc": "#B8860B",
-    "m-icc": "#E3B04B",
-    "fpfh-ransac": "#3B7D4F",
-    "fgr": "#7FB38A",
-    "kiss-gicp": "#7A4FA3",
-    "gicp": "#555B66",
-    "trimmed-icp": "#8C929C",
-    "icp": "#B4B9C1",
-    "cpd": "#D5D8DD",
-}
 
 
 def tell(records: Sequence[Record], out: Path) -> str:
@@ -298,7 +281,6 @@ def _plot(records: Sequence[Record], path: Path) -> None:
 
     protocols = _protocols(records)
     figure, axes = pyplot.subplots(1, len(protocols), figsize=(11, 4.6), sharey=True, squeeze=False)
-    lines = {}
     for panel, protocol in zip(axes[0], protocols, strict=True):
         chosen = _of(records, protocol=protocol)
         for method in ORDER:
@@ -306,21 +288,17 @@ def _plot(records: Sequence[Record], path: Path) -> None:
             gaps = sorted({gap for gap, _ in told})
             shares = [share_right([t for g, t in told if g == gap], limit) for gap in gaps]
             if gaps:
-                lines[METHODS[method].title] = panel.plot(
-                    gaps,
-                    [100 * share for share in shares],
-                    color=_COLORS[method],
-                    lw=2.6 if method in ("default", "paper") else 1.4,
-                    marker="o",
-                    ms=3.5,
-                    zorder=3 if method in ("default", "paper") else 2,
-                )[0]
+                draw_shares(panel, method, gaps, shares)
         panel.set(title=PROTOCOL_TITLES[protocol], xlabel="gap between the views (°)")
-        panel.grid(color="#E4E6EA", lw=0.8)
-        panel.spines[["top", "right"]].set_visible(False)
         panel.set_xticks(_gaps(chosen))
-    axes[0][0].set(ylabel="right answers (%)", ylim=(-4, 104))
-    figure.legend(lines.values(), lines.keys(), loc="center right", frameon=False, fontsize=9)
+        dress(panel)
+    axes[0][0].set_ylabel("right answers (%)")
+    lines = {
+        line.get_label(): line for panel in axes[0] for line in panel.get_legend_handles_labels()[0]
+    }
+    titles = [METHODS[m].title for m in ORDER if METHODS[m].title in lines]
+    handles = [lines[title] for title in titles]
+    figure.legend(handles, titles, loc="center right", frameon=False, fontsize=9)
     figure.tight_layout(rect=(0, 0, 0.83, 1))
     figure.savefig(path, dpi=110)
     pyplot.close(figure)
