@@ -35,6 +35,7 @@ IN_WORDS = {
 }
 MIN_OVERLAP = 0.10
 """Pairs that overlap by as much are told of in the README, beside those of half as much."""
+_WIDE, _THIN = f"{100 * MIN_OVERLAP:g} %", f"{50 * MIN_OVERLAP:g} %"
 
 Records = Sequence[dict[str, Any]]
 
@@ -103,10 +104,9 @@ def _pairs_in_words(records: Records) -> str:
     thin = [a for a in answers if 0.5 * MIN_OVERLAP <= a.overlap < MIN_OVERLAP]
     wrong = sum(a.kind == "good" and not a.is_right for a in answers)
     return (
-        f"of the pairs of real scans that overlap by {MIN_OVERLAP:.0%} or more, registered alone "
-        f"from any start pose, {_right(wide)} have the right answer first, of those between "
-        f"{0.5 * MIN_OVERLAP:.0%} and {MIN_OVERLAP:.0%} {_right(thin)}; {wrong} wrong pairs of "
-        f"{len(answers)} are called good.\n"
+        f"of the pairs of real scans that overlap by {_WIDE} or more, registered alone from any "
+        f"start pose, {_right(wide)} have the right answer first, of those between {_THIN} and "
+        f"{_WIDE} {_right(thin)}; {wrong} wrong pairs of {len(answers)} are called good.\n"
     )
 
 
@@ -126,9 +126,9 @@ def _anchors_compared(records: Records) -> str:
         wide = [a for a in of if a.overlap >= MIN_OVERLAP]
         thin = [a for a in of if 0.5 * MIN_OVERLAP <= a.overlap < MIN_OVERLAP]
         told.append(
-            f"- {words}: right first in {_right(wide)} pairs that overlap by {MIN_OVERLAP:.0%} or "
-            f"more and in {_right(thin)} of half as much; {mean(a.seconds for a in of):.2f} s a "
-            "pair\n"
+            f"- {words}: right first in {_right(wide)} pairs that overlap by {_WIDE} or more and "
+            f"in {_right(thin)} between {_THIN} and {_WIDE}; {mean(a.seconds for a in of):.2f} s "
+            "a pair\n"
         )
     return "".join(told)
 

@@ -87,8 +87,8 @@ def test_auc_counts_right_above_wrong(load: Any):
     def answer(score: float, rank: int | None) -> Any:
         return pairs.Answer(
             anchors="mixed", object="o", seed=0, i="i", j="j", overlap=0.2, gap_deg=30.0,
-            kind="good", rotation_deg=0.0, translation_percent=0.0, score=score, evidence={}, margin=1.0,
-            observability=1.0, rank=rank, seconds=0.1,
+            kind="good", rotation_deg=0.0, translation_percent=0.0, score=score, evidence={},
+            margin=1.0, observability=1.0, rank=rank, seconds=0.1,
         )  # fmt: skip
 
     answers = [answer(0.9, 1), answer(0.4, 1), answer(0.5, None), answer(0.1, None)]

@@ -5,6 +5,8 @@
     python -m benchmarks.paper --quick --out DIR        a handful of units, on a made object
     python -m benchmarks.paper --pages                  the pages anew, from the JSON that stands
 
+Without --only or --quick it writes method.md beside the folder of the pages, too.
+
 Finished units are kept: an interrupted study goes on where it stopped. Change the code that
 measures and they are measured again.
 """
@@ -21,6 +23,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from benchmarks.paper.method_page import write_method
 from benchmarks.paper.pages import write_index, write_page
 from benchmarks.paper.study import Study, Table, read_records
 from benchmarks.paper.tables import table, table_names
@@ -46,6 +49,8 @@ def main() -> int:
             _pages_again(tables, study)
         else:
             _measure(tables, study)
+        if not options.only and not options.quick:
+            write_method(study.out)
     except ScanweldError as error:
         print(f"error: {error}", file=sys.stderr)
         return USAGE_ERROR
