@@ -3,11 +3,12 @@
 import hashlib
 import json
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 from scanweld.errors import ScanweldError
 from scanweld.io.atomic import write_whole
@@ -165,8 +166,8 @@ def _key(code: str, table: Table, unit: Unit) -> str:
 
 def _code_digest(table: Table) -> str:
     """Of the code that measures: results of other code are not taken for this one's."""
-    own = f"benchmarks/paper/{table.NAME}.py"
-    paths = {path for pattern in (*_MEASURING, own) for path in _ROOT.glob(pattern)}
+    own = f"benchmarks/paper/{table.NAME}.py", f"benchmarks/paper/{table.NAME}/*.py"
+    paths = {path for pattern in (*_MEASURING, *own) for path in _ROOT.glob(pattern)}
     digest = hashlib.sha256()
     for path in sorted(paths):
         name = path.relative_to(_ROOT).as_posix()
@@ -190,8 +191,17 @@ def _stored(path: Path) -> dict[str, Result]:
 
 def _append(path: Path, key: str, result: Result) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"key": key, "result": result}) + "\n")
+    with path.open("a+b") as file:
+        told = json.dumps({"key": key, "result": result}) + "\n"
+        file.write(b"\n" * _is_cut_short(file) + told.encode())
+
+
+def _is_cut_short(file: BinaryIO) -> bool:
+    """Whether the last line has no end: what came next would be lost with it."""
+    if file.seek(0, os.SEEK_END) == 0:
+        return False
+    file.seek(-1, os.SEEK_END)
+    return file.read() != b"\n"
 
 
 def _plain(result: Result) -> Result:
