@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from statistics import mean, median
+from statistics import mean
 from typing import Any, Literal
 
 import numpy as np
-from benchmarks.paper.method_reasons import REASONS
 
 from benchmarks.paper.method_page import Results
+from benchmarks.paper.method_reasons import REASONS
 from benchmarks.paper.pages import percent
 from benchmarks.paper.settings import SETTINGS, is_converged
 from benchmarks.paper.study import Record
@@ -53,10 +53,6 @@ def _right_pairs(results: Results, anchors: str, overlap: tuple[float, float]) -
 
 def _pair_seconds(results: Results, anchors: str) -> str:
     return f"{mean(a['seconds'] for a in answers(results, anchors)):.2f}"
-
-
-def _median_share(results: Results, right: bool, share: Callable[[Evidence], float]) -> str:
-    return percent(median(share(evidence(a)) for a in answers(results) if is_right(a) is right))
 
 
 def _free_of_right(results: Results) -> str:
@@ -223,11 +219,7 @@ NUMBERS: dict[str, Callable[[Results], str]] = {
     "default-random": partial(_table1, method="default", limit=RIGHT, protocol="random"),
     "even-hypotheses": _even_hypotheses,
     "heat-hypotheses": _heat_hypotheses,
-    "wrong-agree": partial(_median_share, right=False, share=lambda e: e.agree),
-    "wrong-violated": partial(_median_share, right=False, share=lambda e: e.violation),
-    "right-violated": partial(_median_share, right=True, share=lambda e: e.violation),
     "auc-agree": partial(_auc, score=lambda e: e.agree),
-    "auc-once": partial(_auc, score=lambda e: e.agree - e.violation),
     "auc-built": partial(_auc, score=lambda e: e.score),
     "good-right": partial(_good, right=True),
     "good-wrong": partial(_good, right=False),

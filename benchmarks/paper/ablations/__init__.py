@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.paper.ablations import contours, heat, search, terms
+from benchmarks.paper.ablations import coarse, contours, heat, search, terms
 from benchmarks.paper.study import Record, Result, Unit
 
 NAME = "ablations"
 TITLE = "Ablations"
 
-_PARTS = {"contours": contours, "terms": terms, "heat": heat, "search": search}
+_PARTS = {"contours": contours, "terms": terms, "heat": heat, "coarse": coarse, "search": search}
 
 
 def units(quick: bool) -> list[Unit]:

@@ -44,10 +44,10 @@ def measure(unit: Unit) -> Result:
     """Errors of the coarse pose in each reading, None where it gives none."""
     azimuth = float(unit["azimuth"])
     i, j = (virtual_scan(unit["object"], a) for a in (azimuth, azimuth + unit["gap"]))
-    features = [describe(view.scan, HeatConfig()) for view in (i, j)]
+    of_i, of_j = (describe(view.scan, HeatConfig()) for view in (i, j))
     told: dict[str, dict[str, float | None]] = {}
     for name, change in VARIANTS.items():
-        found = register_as_published(i.scan, j.scan, *features, CoarseConfig(**change)).i_from_j
+        found = register_as_published(i.scan, j.scan, of_i, of_j, CoarseConfig(**change)).i_from_j
         deg, shift = (None, None)
         if found is not None:
             deg, shift = pose_error(i.from_other(j), found, j.centre(), i.diameter)
@@ -58,9 +58,9 @@ def measure(unit: Unit) -> Result:
 def page(records: Sequence[Record]) -> str:
     """Right coarse poses of the readings by gap."""
     gaps = list(dict.fromkeys(record.unit["gap"] for record in records))
+    columns = [*([gap] for gap in gaps), gaps]
     rows = [
-        [name, *(cell(told(records, name, [gap]), RIGHT) for gap in gaps)]
-        + [cell(told(records, name, gaps), RIGHT)]
+        [name, *(cell(told(records, name, column), RIGHT) for column in columns)]
         for name in VARIANTS
     ]
     default = CoarseConfig()

@@ -28,6 +28,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "closed, jumps bridged": {"jumps": "bridged"},
     "open (Neumann)": {"surface": "open"},
     "open, cold rims (Dirichlet)": {"surface": "clamped"},
+    "closed, times of Sun et al.": {"times": "sun"},
 }
 CLOSED = "closed, cut at jumps"
 
