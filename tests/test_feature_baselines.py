@@ -130,7 +130,7 @@ def test_scale_invariant_signature_ignores_the_size():
 
 def test_scale_invariant_signature_of_a_sphere_follows_its_heat_trace():
     """All points share the trace h(t) = sum (2 l + 1) exp(-l (l + 1) t) / (4 pi)."""
-    vertices, faces = ball(4)
+    vertices, faces = ball(3)
     spectrum = spectrum_of(vertices, faces, 1.0, 100)
     times = octave_times(2.0**-5, 2.0**6)
     found = si_heat_signature(spectrum.eigenvalues, spectrum.functions, times)
@@ -142,7 +142,7 @@ def test_scale_invariant_signature_of_a_sphere_follows_its_heat_trace():
 
 
 def test_wave_signature_is_one_on_the_whole_and_over_the_sphere():
-    vertices, faces = ball(4)
+    vertices, faces = ball(3)
     spectrum = spectrum_of(vertices, faces, 1.0, 49)
     bands, width = energy_bands(spectrum.eigenvalues)
     signature = wave_signature(spectrum.eigenvalues, spectrum.functions, bands, width)

@@ -55,7 +55,7 @@ def full_mesh_spectrum(
 def full_mesh_hks(spectrum: Spectrum) -> FloatArray:
     """Log heat signature (V, T) of a complete mesh's vertices, at the times that PA-HKS uses.
 
-    HKS(x, t) = sum_i exp(-lambda_i t) phi_i(x)^2 (Sun, Ovsjanikov, Guibas 2009, eq. 3), over the
+    HKS(x, t) = sum_i exp(-lambda_i t) phi_i(x)^2 (Sun, Ovsjanikov & Guibas 2009), over the
     heat trace; see ``heat_signature``.
     """
     times = diffusion_times(spectrum.eigenvalues, _NUM_TIMES, _LONGEST_DIAMETERS2)

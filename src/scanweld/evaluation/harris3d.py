@@ -18,11 +18,11 @@ _BLOCK = 512
 def harris_response(points: FloatArray, at: IntArray, radius: float) -> FloatArray:
     """Harris response (M,) of some points of a surface; -inf where too few points are around.
 
-    The points within the radius are turned so that their least principal axis is z, moved so that
-    the point lies above the origin, and divided by the radius. A quadratic
-    z = p1/2 x^2 + p2 xy + p3/2 y^2 + p4 x + p5 y + p6 is fitted to them, and the products of its
-    derivatives are averaged under a Gaussian (sigma^2 = 2, as the factors of Sipiran & Bustos 2011,
-    eqs. 9-11 imply): A = p4^2 + 2 p1^2 + 2 p2^2, B = p5^2 + 2 p2^2 + 2 p3^2,
+    The points within the radius (the paper counts rings of a mesh) are turned so that their least
+    principal axis is z, moved so that the point is the origin, and divided by the radius. A
+    quadratic z = p1/2 x^2 + p2 xy + p3/2 y^2 + p4 x + p5 y + p6 is fitted to them, and the products
+    of its derivatives are averaged under a Gaussian (sigma^2 = 2, as the factors of Sipiran &
+    Bustos 2011 imply): A = p4^2 + 2 p1^2 + 2 p2^2, B = p5^2 + 2 p2^2 + 2 p3^2,
     C = p4 p5 + 2 p1 p2 + 2 p2 p3. The response is AB - C^2 - 0.04 (A + B)^2.
 
     Args:

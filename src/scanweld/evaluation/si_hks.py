@@ -22,7 +22,7 @@ def si_heat_signature(
     h(x, t) = sum_i exp(-lambda_i t) phi_i(x)^2, constant modes included. An object that is b times
     as large has h'(x, t) = h(x, t / b^2) / b^2: the logarithm turns the factor into a summand, the
     derivative removes it, and the magnitude of the Fourier transform over tau = log2 t removes the
-    shift (Bronstein & Kokkinos 2010, eqs. 7-11). The window of times must be wide enough for the
+    shift (Bronstein & Kokkinos 2010, section 3). The window of times must be wide enough for the
     derivative to vanish at its ends.
 
     Args:

@@ -7,14 +7,13 @@ from scanweld.geometry.arrays import FloatArray
 _CONSTANT = 1e-6
 """Eigenvalues below this, for a mesh of unit size, belong to functions constant on each piece."""
 _WIDTH_STEPS = 7
-"""Width of the energy bands, in steps from one to the next (Aubry et al. 2011, section 5)."""
+"""Width of the energy bands, in steps from one to the next (Aubry et al. 2011)."""
 
 
 def energy_bands(eigenvalues: FloatArray, num_bands: int = 100) -> tuple[FloatArray, float]:
     """Logarithms of energies (E,), evenly spaced, and the width sigma of the bands around them.
 
-    The bands keep 2 sigma from both ends of the spectrum, with sigma = 7 steps (Aubry et al. 2011,
-    section 5).
+    The bands keep 2 sigma from both ends of the spectrum, with sigma = 7 steps (Aubry et al. 2011).
     """
     varying = eigenvalues[eigenvalues > _CONSTANT]
     low, high = np.log(varying[0]), np.log(varying[-1])
@@ -29,7 +28,7 @@ def wave_signature(
     """WKS(x, e) = C_e sum_k phi_k(x)^2 exp(-(e - log lambda_k)^2 / (2 sigma^2)): (V, E).
 
     C_e = 1 / sum_k exp(-(e - log lambda_k)^2 / (2 sigma^2)), so that the signature at every energy
-    integrates to one over the surface (Aubry et al. 2011, eq. 4). Constant modes are skipped.
+    integrates to one over the surface (Aubry et al. 2011). Constant modes are skipped.
 
     Args:
         eigenvalues: (K,).
@@ -44,10 +43,7 @@ def wave_signature(
 
 
 def wave_distances(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Distances (N, M) of signatures (N, E) and (M, E): sum_e |a - b| / (a + b).
-
-    Aubry et al. 2011, eq. 6.
-    """
+    """Sums (N, M) of |a - b| / (a + b) over the energies, as Aubry et al. compare signatures."""
     distances = np.empty((len(one), len(other)))
     for row, a in enumerate(one):
         total = np.maximum(a + other, np.finfo(float).tiny)
