@@ -11,8 +11,8 @@ from benchmarks.paper.baselines.records import Answer, ScanPair
 from benchmarks.paper.optional import need
 from scanweld.geometry.pose import Pose
 
-VOXEL = 0.015
-"""In diameters."""
+VOXEL = 0.01
+"""In diameters; 0.015 takes a third of the time and finds fewer pairs from 90 degrees on."""
 NORMAL_VOXELS = 2.0
 FEATURE_VOXELS = 5.0
 """Radii of normals and features, as in the library's tutorial."""
@@ -21,6 +21,8 @@ MATCH_VOXELS = 1.5
 NUM_ITERATIONS = 200_000
 CONFIDENCE = 0.999
 EDGE_RATIO = 0.9
+FGR_MATCH_VOXELS = 1.5
+FGR_NUM_TUPLES = 1000
 ICP_LEVELS = ((0.015, 0.03), (0.005, 0.01))
 """Voxel and farthest match of each level of the final point-to-plane ICP, in diameters."""
 ICP_ITERATIONS = 50
@@ -60,7 +62,8 @@ def fgr(pair: ScanPair, start: Pose, seed: int) -> Answer:
         *(j, i, features_j, features_i),
         registration.FastGlobalRegistrationOption(
             use_absolute_scale=True,
-            maximum_correspondence_distance=MATCH_VOXELS * VOXEL,
+            maximum_correspondence_distance=FGR_MATCH_VOXELS * VOXEL,
+            maximum_tuple_count=FGR_NUM_TUPLES,
         ),
     )
     return _refined(clouds, found.transformation, library)
