@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scanweld import pipeline
+from scanweld import pipeline, steps
 from scanweld.config import Config, FusionConfig, HeatConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.metrics import (
@@ -230,7 +230,7 @@ def test_a_model_that_cannot_be_fused_is_not_passed_over(monkeypatch: pytest.Mon
     def refuse(*_: object) -> None:
         raise InputError("no surface")
 
-    monkeypatch.setattr(pipeline, "fuse", refuse)
+    monkeypatch.setattr(steps, "fuse", refuse)
     result = run(few()[:2])
     assert len(result.poses) == 2 and result.mesh is None
     assert result.verdict is Verdict.PARTIAL

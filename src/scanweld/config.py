@@ -104,12 +104,19 @@ class CoarseConfig(Section):
     max_signature_distance: float | None = Field(default=None, gt=0)
     """Threshold of eq. 1: root mean square difference of the log signatures. By the quantile if
     None."""
-    signature_quantile: float = Field(default=0.5, gt=0, le=1)
-    """The threshold of eq. 1 as a quantile of the matches' distances; 1 keeps all."""
+    signature_quantile: float = Field(default=1.0, gt=0, le=1)
+    """The threshold of eq. 1 as a quantile of the matches' distances: 0.5 is the median, 1 keeps
+    all. Every threshold did worse: it takes away right matches like wrong ones."""
     icp: Literal["keypoints", "surface"] = "surface"
     """What the ICP aligns: the matched keypoints alone, or the scans' surfaces."""
     trim: Share | Literal["auto"] | None = None
     """Share of the closest points that the ICP goes by, or "auto"; all if None."""
+    start: Literal["fit", "consensus", "evidence"] = "fit"
+    """Where the ICP starts: at a fit to all matches, as published; or, ours, where most of the
+    nearest signatures agree, or at the poses of keypoints that the sensors' evidence speaks for,
+    whatever the signatures."""
+    num_nearest: int = Field(default=8, ge=1)
+    """Nearest signatures that are tried for each keypoint where the matches must agree."""
 
 
 class GraphConfig(Section):

@@ -11,12 +11,31 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features
 from scanweld.heat.matching import match_signatures
+from scanweld.pairs.consensus import agreed_pose
+from scanweld.pairs.distinct import distinct_poses
+from scanweld.pairs.field import make_field
+from scanweld.pairs.hypotheses import Anchors, sweep
 from scanweld.pairs.point_icp import PointAlignment, point_icp
+from scanweld.pairs.register import (
+    SAME_ANGLE_DEG,
+    SAME_SHIFT_DIAMETERS,
+    score_poses,
+    to_pose,
+)
+from scanweld.pairs.visibility import pose_rows
 
 MIN_MATCHES = 3
 """Fewer matched keypoints hold no pose."""
 MIN_BREADTH_DIAMETERS = 0.02
 """Matched keypoints that lie on a line to within this, root mean square, hold no pose either."""
+NUM_TURNS = 36
+"""Turns about the normal for each pair of keypoints, where the evidence chooses."""
+EVIDENCE_DIAMETERS = (0.04, 0.02)
+"""Depth tolerance of the evidence, of start poses and of answers."""
+MAX_STARTS = 2000
+"""Start poses that are looked at,"""
+NUM_STARTS = 10
+"""and distinct ones that go on to the ICP."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -25,7 +44,8 @@ class CoarseAnswer:
 
     Attributes:
         i_from_j: The pose between the sensor frames; None if there is none.
-        num_matches: Keypoints of i that have a correspondence in j.
+        num_matches: Keypoints of i that have a correspondence in j, or agree on the start pose;
+            start poses, where the evidence chooses.
         rms: Of the distances that the ICP ended with, in the scans' unit; NaN without a pose.
         reason: Why there is no pose; empty if there is one.
     """
@@ -45,8 +65,8 @@ def register_as_published(
 ) -> CoarseAnswer:
     """Match the keypoints of two scans by their signatures, fit, and go on by ICP.
 
-    The paper has the correspondences "initialise" an ICP of the keypoints and leaves open on what
-    it runs; the readings are options.
+    The paper has the correspondences "initialise" an ICP and leaves open on what it runs; the
+    readings are options. Starts other than the fit are ours: what had to change.
 
     Args:
         i: First scan.
@@ -55,6 +75,24 @@ def register_as_published(
         features_j: Keypoints of j; T of eq. 1.
         config: The reading.
     """
+    if config.start == "consensus":
+        start, support = agreed_pose(features_i, features_j, config.num_nearest, i.diameter)
+        if start is None or support < MIN_MATCHES:
+            return _no_pose(support, f"{support} keypoints agree on a pose, 3 are needed")
+        return _answer(support, _surface_icp(i, j, start, config))
+    if config.start == "evidence":
+        return _register_by_evidence(i, j, features_i, features_j, config)
+    return _register_by_fit(i, j, features_i, features_j, config)
+
+
+def _register_by_fit(
+    i: PreparedScan,
+    j: PreparedScan,
+    features_i: Features,
+    features_j: Features,
+    config: CoarseConfig,
+) -> CoarseAnswer:
+    """As published: a fit to all matches of eq. 1, then ICP of keypoints or surfaces."""
     matches = match_signatures(
         features_i.signatures,
         features_j.signatures,
@@ -69,25 +107,50 @@ def register_as_published(
     if breadth < MIN_BREADTH_DIAMETERS:
         return _no_pose(len(matches), "the matched keypoints lie on a line")
     start = rigid_fit(points_j, points_i)
-    found = _icp(i, j, points_i, points_j, start, config)
-    return CoarseAnswer(
-        i_from_j=found.target_from_source, num_matches=len(matches), rms=found.rms, reason=""
-    )
+    if config.icp == "surface":
+        return _answer(len(matches), _surface_icp(i, j, start, config))
+    once_i, once_j = np.unique(points_i, axis=0), np.unique(points_j, axis=0)
+    return _answer(len(matches), point_icp(once_j, once_i, start, config.trim))
 
 
-def _icp(
+def _register_by_evidence(
     i: PreparedScan,
     j: PreparedScan,
-    points_i: FloatArray,
-    points_j: FloatArray,
-    start: Pose,
+    features_i: Features,
+    features_j: Features,
     config: CoarseConfig,
+) -> CoarseAnswer:
+    """Keypoints as places: all pairs of them with all turns, ICP, and the sensors choose.
+
+    Signatures only say where keypoints are. The start poses and the answer are those that the
+    visibility evidence speaks for most.
+    """
+    field_i, field_j = make_field(i, i.diameter), make_field(j, i.diameter)
+    anchors_i = Anchors(points=features_i.points, normals=features_i.normals)
+    anchors_j = Anchors(points=features_j.points, normals=features_j.normals)
+    coarse, middle = (share * i.diameter for share in EVIDENCE_DIAMETERS)
+    rows, _ = sweep(field_i, field_j, anchors_i, anchors_j, NUM_TURNS, coarse, MAX_STARTS)
+    near = np.radians(SAME_ANGLE_DEG), SAME_SHIFT_DIAMETERS * i.diameter
+    chosen = distinct_poses(rows, field_j.centre, *near, NUM_STARTS)
+    if len(chosen) == 0:
+        return _no_pose(0, "no pair of keypoints gives a pose that the sensors allow")
+    found = [_surface_icp(i, j, to_pose(row), config) for row in rows[chosen]]
+    poses = pose_rows([alignment.target_from_source for alignment in found])
+    scores = score_poses(field_i, field_j, poses, len(field_i.points), middle)
+    return _answer(len(chosen), found[int(np.argmax(scores))])
+
+
+def _surface_icp(
+    i: PreparedScan, j: PreparedScan, start: Pose, config: CoarseConfig
 ) -> PointAlignment:
-    """ICP of j onto i: of the keypoints that have a correspondence, or of the surfaces."""
-    if config.icp == "keypoints":
-        once_i, once_j = np.unique(points_i, axis=0), np.unique(points_j, axis=0)
-        return point_icp(once_j, once_i, start, config.trim)
+    """ICP of samples of j onto all points of i."""
     return point_icp(j.samples.points, i.mesh.vertices, start, config.trim)
+
+
+def _answer(num_matches: int, found: PointAlignment) -> CoarseAnswer:
+    return CoarseAnswer(
+        i_from_j=found.target_from_source, num_matches=num_matches, rms=found.rms, reason=""
+    )
 
 
 def _breadth(points: FloatArray) -> float:
