@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean benchmarks
+.PHONY: demo test lint clean benchmarks paper
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
@@ -25,6 +25,11 @@ benchmarks: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/stress.py --few --seeds 1 --out docs/data/stress.json
 	$(BIN)/python benchmarks/pages.py
 
+# The paper's tables and figures beside ours, into docs/paper; needs the Stanford data, takes an hour
+# on 2 cores, and goes on where it was stopped. Without the data: make paper PAPER="--quick --out DIR".
+paper: $(VENV)/.installed-bench
+	$(BIN)/python -m benchmarks.paper $(PAPER)
+
 clean:
 	rm -rf $(VENV) demo
 
@@ -35,4 +40,8 @@ $(VENV)/.installed: pyproject.toml
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+$(VENV)/.installed-bench: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,bench]'
 	touch $@

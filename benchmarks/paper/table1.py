@@ -28,15 +28,16 @@ PROTOCOLS = ("identity", "random")
 NOISE = 1e-3
 """Standard deviation of the depth, in diameters, besides none at all."""
 NOISY_AZIMUTHS = AZIMUTHS[::2]
-QUICK_GAPS = (30, 90)
+QUICK_GAPS = (30, 80)
 
 FROM_A_START = ("icp", "trimmed-icp", "gicp", "m-icc", "mm-icc")
 OWN = ("paper-coarse", "paper", "default")
 ELSEWHERE = ("fpfh-ransac", "fgr", "kiss-gicp")
-"""Library methods that make nothing of the start: they are tried from one kind of it only."""
+"""Library methods that make nothing of the start: they are tried from one kind of it only,"""
 NOISY = ("m-icc", "mm-icc", "paper", "default", "fpfh-ransac")
-CPD_AZIMUTHS, CPD_MAX_GAP = (0, 90), 90
-"""CPD takes as long as all others together, and comes to nothing long before."""
+"""and so is the default where there is noise."""
+CPD_AZIMUTHS, CPD_GAPS = (0, 90), (10, 30, 50, 70, 90)
+"""CPD takes as long as all others together."""
 RIGHT_MATCH = 0.05
 """In diameters: matched keypoints that lie closer than this are the same place of the object."""
 
@@ -86,10 +87,12 @@ def methods_of(unit: Unit) -> tuple[str, ...]:
         names = NOISY
     else:
         names = (*FROM_A_START, *OWN)
-        if unit["azimuth"] in CPD_AZIMUTHS and unit["gap"] <= CPD_MAX_GAP:
+        if unit["azimuth"] in CPD_AZIMUTHS and unit["gap"] in CPD_GAPS:
             names = (*names, "cpd")
         names = (*names, *ELSEWHERE)
-    left_out = ELSEWHERE if unit["protocol"] == "identity" else ("paper-coarse",)
+    left_out = ("paper-coarse",)
+    if unit["protocol"] == "identity":
+        left_out = (*ELSEWHERE, "default") if unit["noise"] else ELSEWHERE
     return tuple(name for name in names if name not in left_out)
 
 

@@ -93,6 +93,8 @@ def _floors(records: Sequence[Record]) -> str:
                 if r.unit["gap"] <= NEAR_GAP and "default" in r.result["answers"]
             ]
             wrong = [r for r in near if not RIGHT.holds(r.result["answers"]["default"])]
+            if not near:
+                continue
             asked = f"{name}, {PROTOCOL_TITLES[protocol]}, to {NEAR_GAP}°, {_noise_title(noise)}"
             rows.append(_floor_row(asked, len(near), len(wrong), 1.0))
             failing += wrong
