@@ -182,8 +182,9 @@ fraction where fewer than {FEW} were asked. In parentheses: what chance alone wo
 PA-HKS, SI-HKS and WKS are taken from the artificial mesh of each scan, at the keypoints of PA-HKS;
 FPFH comes without a detector and is taken at those of 3D Harris. HKS on the full mesh needs what no
 scan has: it sees the same surface from both sides, so that its keypoints repeat by construction.
-At evenly spread points ({NUM_EVEN} a view) all descriptors have the same task; the full mesh is
-their ceiling there: it cannot tell left from right, and no sample has its exact counterpart.
+At evenly spread points ({NUM_EVEN} a view) all descriptors have the same task. The full mesh shows
+there what HKS can do at best: it cannot tell left from right, and no sample has its exact
+counterpart.
 """
 
 
