@@ -11,7 +11,7 @@ from benchmarks.paper.ablations import coarse, contours, heat, search, terms
 from benchmarks.paper.method_page import Results
 from benchmarks.paper.pages import percent
 from benchmarks.paper.study import Record
-from benchmarks.paper.success import Limit, auc
+from benchmarks.paper.success import Limit
 
 WIDE_GAP, FAR_START = 90, 40
 """Where basins are told of, in degrees."""
@@ -72,11 +72,7 @@ def _coarse(results: Results, variant: str) -> str:
 
 def _first(results: Results, score: str) -> str:
     """Pairs whose right pose comes first by a score, of those that the default keeps; and AUC."""
-    kept = [record.result["mixed"] for record in _of(results, "search") if record.result["mixed"]]
-    scores = [[search.SCORES[score](each) for each in poses] for poses in kept]
-    right = [[search.RIGHT.holds(each) for each in poses] for poses in kept]
-    firsts = [r[int(np.argmax(s))] for s, r in zip(scores, right, strict=True)]
-    value = auc([s for each in scores for s in each], [r for each in right for r in each])
+    firsts, value = search.rescored(_of(results, "search"), search.SCORES[score])
     return f"{sum(firsts)} of {len(firsts)} (AUC {value:.3f})"
 
 
@@ -125,11 +121,13 @@ _HEAT = {
 }
 _COARSE = {
     "taken": coarse.TAKEN,
-    "all": "all matches",
-    "quarter": "the better quarter",
+    "half": "the better half of the matches",
+    "quarter": "the better quarter of the matches",
     "mutual": "mutual matches",
     "keypoints": "ICP of the keypoints alone",
     "trimmed": "trimmed ICP",
+    "consensus": "ours: start where the nearest signatures agree",
+    "evidence": "ours: start where the evidence is best",
 }
 _TERMS = {"contours": terms.ALONE, "surfaces": "surfaces alone", "both": "both"}
 _KINDS = {"agree": ("agree",), "violated": ("front", "contradict", "free")}
