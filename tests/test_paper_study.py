@@ -127,6 +127,8 @@ def test_a_cell_counts_the_right_and_takes_their_median_only():
     assert cell(told, limit) == "2/4 0.20"
     assert cell(told[2:], limit) == "0/2"
     assert cell([], limit) == ""
+    assert cell([*told, answer(4.0)], limit, Limit(deg=5, percent=1)) == "2/5 0.20 (+1)"
+    assert cell(told, limit, Limit(deg=5, percent=1)) == "2/4 0.20"
     assert share_right(told, limit) == 0.5
 
 
@@ -153,9 +155,11 @@ def line_with(page: str, text: str) -> str:
 
 def test_the_floors_pass_where_they_are_met(tmp_path: Path):
     records = [pair_record(gap, 0.5, 0.1) for gap in (10, 90)]
-    page = tell([*records, pair_record(110, 0.2, 0.5)], tmp_path)
-    assert "| 2/2 | 100 % | pass |" in line_with(page, "bunny, any start, to 90°, no noise")
-    assert "| 1/1 | 95 % | pass |" in line_with(page, "beyond 90°, overlap from 0.15")
+    page = tell([*records, pair_record(110, 0.2, 1.5)], tmp_path)
+    assert "| < 1°, < 1 % | 2/2 | 100 % | pass |" in line_with(
+        page, "bunny, any start, to 90°, no noise"
+    )
+    assert "| < 2°, < 1 % | 1/1 | 95 % | pass |" in line_with(page, "beyond 90°, overlap from 0.15")
     assert "FAIL" not in page
     assert (tmp_path / "table1.png").stat().st_size > 5000
 
@@ -165,8 +169,8 @@ def test_a_pair_below_the_floor_fails_and_is_named(tmp_path: Path):
     page = tell([pair_record(90, 0.5, 1.1), *far, pair_record(120, 0.12, None)], tmp_path)
     assert "| 0/1 | 100 % | **FAIL** |" in line_with(page, "bunny, any start, to 90°, no noise")
     assert "| 4/5 | 80 % | pass |" in line_with(page, "beyond 90°, overlap 0.10-0.15")
-    assert "| 0.50 | 1.1°, 0.1 % | no |" in line_with(page, "bunny 45° and 135°")
-    assert "no answer" in line_with(page, "bunny 45° and 165°")
+    assert "| 0.50 | 1.1°, 0.1 % | no |" in line_with(page, "bunny, 45° and 135°")
+    assert "no answer" in line_with(page, "bunny, 45° and 165°")
 
 
 def test_the_papers_numbers_stand_only_beside_its_gaps(tmp_path: Path):

@@ -28,10 +28,10 @@ COLORS = {
 _BOLD = ("default", "paper")
 
 
-def draw_shares(axes: Any, method: str, places: Sequence[float], shares: Sequence[float]) -> None:
-    """Draw a method's shares into axes of matplotlib, as percentages, under its title."""
+def draw_shares(axes: Any, method: str, places: Sequence[float], shares: Sequence[float]) -> Any:
+    """Draw a method's shares into axes of matplotlib, as percentages; the line bears its title."""
     bold = method in _BOLD
-    axes.plot(
+    [line] = axes.plot(
         places,
         [100 * share for share in shares],
         label=METHODS[method].title,
@@ -41,6 +41,7 @@ def draw_shares(axes: Any, method: str, places: Sequence[float], shares: Sequenc
         markersize=3.5,
         zorder=3 if bold else 2,
     )
+    return line
 
 
 def dress(axes: Any) -> None:

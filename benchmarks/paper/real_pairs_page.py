@@ -1,6 +1,6 @@
 """The page of the real pairs: what its records say."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +9,16 @@ from benchmarks.paper.lines import ORDER, draw_shares, dress
 from benchmarks.paper.methods import METHODS
 from benchmarks.paper.optional import need
 from benchmarks.paper.pages import markdown_table
+from benchmarks.paper.picks import (
+    of,
+    overlap_title,
+    overlapping,
+    sentence_on_missing,
+    told_by,
+    values,
+)
 from benchmarks.paper.study import Record
-from benchmarks.paper.success import Limit, Told, auc, cell, share_right
+from benchmarks.paper.success import Limit, auc, cell, share_right
 
 BASIN = Limit(deg=5, percent=2)
 TIGHT = Limit(deg=2, percent=1)
@@ -33,7 +41,7 @@ ones.** {_STARTS}"""
 def tell(records: Sequence[Record], out: Path) -> str:
     """The page as Markdown; its plot goes to the folder ``out``."""
     _plot(records, out / _PLOT)
-    objects = list(dict.fromkeys(r.unit["object"] for r in records))
+    objects = values(records, "object")
     parts = [
         _introduction(records, objects),
         f"![Share of pairs in the right basin by overlap]({_PLOT})\n",
@@ -43,7 +51,7 @@ def tell(records: Sequence[Record], out: Path) -> str:
         f"## Right to {TIGHT}\n",
         _by_overlap(records, TIGHT),
         *(
-            f"### {name}\n\n" + _by_overlap([r for r in records if r.unit["object"] == name], TIGHT)
+            f"### {name}\n\n" + _by_overlap(of(records, object=name), TIGHT)
             for name in objects
             if len(objects) > 1
         ),
@@ -54,32 +62,29 @@ def tell(records: Sequence[Record], out: Path) -> str:
 
 
 def _introduction(records: Sequence[Record], objects: Sequence[str]) -> str:
-    missing = sorted({module for r in records for module in r.unit.get("missing", ())})
-    counts = ", ".join(f"{sum(r.unit['object'] == n for r in records)} of the {n}" for n in objects)
+    counts = ", ".join(f"{len(of(records, object=name))} of the {name}" for name in objects)
     text = _STAND_INS if objects == ["creature"] else _REAL
-    if missing:
-        text += f"\nNot installed, and the methods that need them left out: {', '.join(missing)}.\n"
-    return f"{len(records)} pairs: {counts}. {text}"
+    return f"{len(records)} pairs: {counts}. {text}{sentence_on_missing(records)}"
 
 
 def _by_overlap(records: Sequence[Record], limit: Limit) -> str:
-    bins = [(low, high) for low, high in BINS if _inside(records, low, high)]
+    bins = [(low, high) for low, high in BINS if overlapping(records, low, high)]
     rows = [
         (
             METHODS[method].title,
-            *(cell(_told(_inside(records, low, high), method), limit) for low, high in bins),
+            *(cell(told_by(overlapping(records, low, high), method), limit) for low, high in bins),
         )
         for method in ORDER
-        if _told(records, method)
+        if told_by(records, method)
     ]
-    headings = ("overlap", *(_title(low, high) for low, high in bins))
+    headings = ("overlap", *(overlap_title(low, high) for low, high in bins))
     return markdown_table(headings, rows)
 
 
 def _scores(records: Sequence[Record]) -> str:
     rows = []
     for method in ORDER:
-        told = _told(records, method)
+        told = told_by(records, method)
         if not told:
             continue
         given = [each for each in told if each["deg"] is not None]
@@ -112,15 +117,15 @@ def _plot(records: Sequence[Record], path: Path) -> None:
     need("matplotlib").use("Agg")
     from matplotlib import pyplot
 
-    bins = [(low, high) for low, high in reversed(BINS) if _inside(records, low, high)]
+    bins = [(low, high) for low, high in reversed(BINS) if overlapping(records, low, high)]
     figure, axes = pyplot.subplots(figsize=(9, 4.6))
     for method in ORDER:
-        told = [_told(_inside(records, low, high), method) for low, high in bins]
+        told = [told_by(overlapping(records, low, high), method) for low, high in bins]
         places = [place for place, answers in enumerate(told) if answers]
         if places:
             draw_shares(axes, method, places, [share_right(told[place], BASIN) for place in places])
-    counts = [len(_inside(records, low, high)) for low, high in bins]
-    labels = [f"{_title(*edges)}\n{n} pairs" for edges, n in zip(bins, counts, strict=True)]
+    counts = [len(overlapping(records, low, high)) for low, high in bins]
+    labels = [f"{overlap_title(*edges)}\n{n} pairs" for edges, n in zip(bins, counts, strict=True)]
     axes.set_xticks(range(len(bins)), labels)
     axes.set(xlabel="overlap", ylabel=f"right answers, {BASIN} (%)")
     dress(axes)
@@ -128,17 +133,3 @@ def _plot(records: Sequence[Record], path: Path) -> None:
     figure.tight_layout()
     figure.savefig(path, dpi=110)
     pyplot.close(figure)
-
-
-def _inside(records: Iterable[Record], low: float, high: float) -> list[Record]:
-    return [r for r in records if low <= r.result["overlap"] < high]
-
-
-def _told(records: Iterable[Record], method: str) -> list[Told]:
-    return [r.result["answers"][method] for r in records if method in r.result["answers"]]
-
-
-def _title(low: float, high: float) -> str:
-    if high > 1:
-        return f"from {low:.2f}"
-    return f"{low:.2f}-{high:.2f}" if low else f"below {high:.2f}"

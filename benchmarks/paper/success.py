@@ -31,13 +31,17 @@ def share_right(told: Sequence[Told], limit: Limit) -> float:
     return float(np.mean([limit.holds(each) for each in told])) if told else float("nan")
 
 
-def cell(told: Sequence[Told], limit: Limit) -> str:
-    """Right of all, and the median rotation of the right ones: "7/8 0.03"."""
+def cell(told: Sequence[Told], limit: Limit, near: Limit | None = None) -> str:
+    """Right of all, and the median rotation of the right ones: "7/8 0.03".
+
+    With a wider limit, also how many more answers lie within that one: "7/8 0.03 (+1)".
+    """
     if not told:
         return ""
     right = [each["deg"] for each in told if limit.holds(each)]
     middle = f" {np.median(right):.2f}" if right else ""
-    return f"{len(right)}/{len(told)}{middle}"
+    more = sum(near.holds(each) for each in told) - len(right) if near else 0
+    return f"{len(right)}/{len(told)}{middle}" + (f" (+{more})" if more else "")
 
 
 def auc(scores: Sequence[float], is_right: Sequence[bool]) -> float:
