@@ -123,6 +123,7 @@ def test_options_reach_the_settings(scans: Path, monkeypatch: pytest.MonkeyPatch
         ["run", "scans", "-o", "model", "--workers", "two"],
         ["run", "scans", "-o", "model", "--seed", "-1"],
         ["run", "scans", "-o", "model", "--unit", "foo"],
+        ["run", "scans", "-o", "model", "--method", "nonsense"],
         ["nonsense"],
         ["info"],
         ["simulate", "mesh.ply"],
@@ -138,6 +139,22 @@ def test_usage_errors_exit_with_2(
     out, err = capsys.readouterr()
     assert out == "" and "Error" in err and "Traceback" not in err
     assert [path.name for path in Path().iterdir()] == ["scans"]
+
+
+def test_an_unknown_method_is_told_the_two_there_are(capsys: pytest.CaptureFixture[str]):
+    assert scanweld("run", "scans", "-o", "model", "--method", "nonsense") == 2
+    told = [line for line in capsys.readouterr().err.splitlines() if "nonsense" in line]
+    assert len(told) == 1 and "robust" in told[0] and "paper" in told[0]
+
+
+def test_the_method_may_come_from_the_settings_or_the_command(scans: Path):
+    Path("my.toml").write_text("method = 'paper'\n")
+    for output, options in (("a", ["--config", "my.toml"]), ("b", ["--method", "paper"])):
+        assert scanweld("run", scans, "-o", output, *options) == 0
+        told = json.loads(Path(output, "report.json").read_text())
+        assert told["settings"]["method"] == "paper"
+    assert scanweld("run", scans, "-o", "c", "--config", "my.toml", "--method", "robust") == 0
+    assert json.loads(Path("c/report.json").read_text())["settings"]["method"] == "robust"
 
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]):

@@ -59,11 +59,19 @@ def test_an_unknown_setting_is_named(tmp_path: Path, text: str, place: str):
         ("[prepare]\nimage_pixels = 100.5", "prepare.image_pixels"),
         ("[contours]\ntrim = 0.0", "contours.trim"),
         ("unit = 'furlong'", "unit"),
+        ("method = 'nonsense'", "method"),
+        ("[coarse]\nicp = 'splines'", "coarse.icp"),
+        ("[heat]\nsurface = 'ajar'", "heat.surface"),
         ("pairs = 3", "pairs"),
     ],
 )
 def test_a_setting_out_of_its_range_is_named(tmp_path: Path, text: str, place: str):
     assert f": {place}: " in refusal(tmp_path, text)
+
+
+def test_an_unknown_method_is_told_the_two_there_are(tmp_path: Path):
+    told = refusal(tmp_path, "method = 'nonsense'")
+    assert "robust" in told and "paper" in told
 
 
 @pytest.mark.parametrize("text", ["seed = ", "[pairs", "seed = 1\nseed = 2", "= 3", "a b c\n" * 3])

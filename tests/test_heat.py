@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.sparse.linalg import ArpackNoConvergence
-from scipy.spatial import KDTree
+from scipy.spatial import Delaunay, KDTree
 
 from scanweld.config import HeatConfig, PrepareConfig
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
@@ -24,7 +24,8 @@ from scanweld.heat.artificial_mesh import ArtificialMesh, close_front
 from scanweld.heat.front import FrontMesh, pieces, thin_front
 from scanweld.heat.keypoints import group, persistent_maxima
 from scanweld.heat.laplacian import eigenpairs
-from scanweld.heat.signature import diffusion_times, heat_signature
+from scanweld.heat.signature import diffusion_times, heat_signature, sun_times
+from scanweld.heat.surface import heat_surface
 from scanweld.prepare import prepare
 from tests.scenes import MILD_NOISE, small_creature
 
@@ -140,8 +141,10 @@ def test_front_is_measured_and_walls_run_behind_it():
     assert len(mesh.vertices) < 3 * mesh.num_front
 
 
-@pytest.mark.parametrize(("step", "num_pieces"), [(5.0, 1), (8.0, 2)])
-def test_front_is_cut_at_jumps(step: float, num_pieces: int):
+@pytest.mark.parametrize(
+    ("step", "bridged", "num_pieces"), [(5.0, False, 1), (8.0, False, 2), (8.0, True, 1)]
+)
+def test_front_is_cut_at_jumps(step: float, bridged: bool, num_pieces: int):
     """A wall before another one, seen straight on; the edge lies between the thinned columns."""
     camera = Camera(
         model=CameraModel.ORTHOGRAPHIC, width=60, height=60, fx=1.0, fy=1.0, cx=30.0, cy=30.0
@@ -159,7 +162,7 @@ def test_front_is_cut_at_jumps(step: float, num_pieces: int):
         is_rim=flat > 0,
         pixel=1.0,
     )
-    front = thin_front(image, 450)
+    front = thin_front(image, 450, bridged=bridged)
     assert len(np.unique(np.diff(np.unique(front.pixels[:, 1])))) == 1
     assert len(np.unique(pieces(front.faces, len(front.points)))) == num_pieces
     columns = front.pixels[front.faces][..., 1]
@@ -196,6 +199,60 @@ def test_open_square_has_the_spectrum_of_cosines():
     values, _ = eigenpairs(vertices, faces, 10)
     waves = np.sort([np.pi**2 * (m * m + n * n) for m in range(5) for n in range(5)])[:10]
     assert values == pytest.approx(waves, rel=0.02, abs=1e-9)
+
+
+def disc(num_rings: int = 30) -> tuple[FloatArray, IntArray]:
+    """A flat disc of radius 1."""
+    rings = [
+        np.stack([r * np.cos(a), r * np.sin(a)], axis=1)
+        for k in range(1, num_rings + 1)
+        for r, a in [(k / num_rings, 2 * np.pi * np.arange(6 * k) / (6 * k))]
+    ]
+    flat = np.concatenate([np.zeros((1, 2)), *rings])
+    faces = Delaunay(flat).simplices.astype(np.int64)
+    return np.column_stack([flat, np.zeros(len(flat))]), faces
+
+
+def test_open_and_clamped_discs_have_the_spectra_of_bessel_functions():
+    """Squares of the zeros of J_m' where no heat leaves (Neumann), of J_m at a cold rim."""
+    vertices, faces = disc()
+    rim = np.flatnonzero(np.linalg.norm(vertices, axis=1) > 0.999)
+    free, _ = eigenpairs(vertices, faces, 7)
+    zeros = np.array([0.0, 1.8412, 1.8412, 3.0542, 3.0542, 3.8317, 4.2012])
+    assert free == pytest.approx(zeros**2, rel=0.02, abs=1e-9)
+    held, functions = eigenpairs(vertices, faces, 6, rim)
+    zeros = np.array([2.4048, 3.8317, 3.8317, 5.1356, 5.1356, 5.5201])
+    assert held == pytest.approx(zeros**2, rel=0.02)
+    assert not functions[rim].any() and np.abs(functions[0]).max() > 0.1
+
+
+def test_a_clamped_front_has_no_heat_at_its_rims():
+    scan = prepared(20.0)
+    front = thin_front(scan.image, 1000)
+    surface = heat_surface(front, scan.image.camera, scan.diameter, "clamped")
+    assert np.array_equal(surface.faces, front.faces) and len(surface.cold) > 50
+    vertices = surface.vertices / scan.diameter
+    values, functions = eigenpairs(vertices, surface.faces, 60, surface.cold)
+    signature = heat_signature(values, functions, diffusion_times(values, 5, 2e-2))
+    warm = np.setdiff1d(np.arange(surface.num_front), surface.cold)
+    assert signature[surface.cold] == pytest.approx(np.log(1e-9))
+    assert np.median(signature[warm], axis=0).min() > np.log(1e-9) + 5
+
+
+@pytest.mark.parametrize("change", [{"surface": "open"}, {"surface": "clamped"}, {"times": "sun"}])
+def test_other_surfaces_and_times_give_other_keypoints_by_the_same_rules(change: dict[str, str]):
+    found = describe(prepared(20.0), HeatConfig.model_validate(CONFIG.model_dump() | change))
+    plain = described(20.0)
+    assert len(found) >= 5 and found.signatures.shape == (len(found), CONFIG.num_times)
+    assert np.isfinite(found.signatures).all()
+    assert found.points.shape != plain.points.shape or not np.allclose(found.points, plain.points)
+
+
+def test_times_of_sun_span_the_spectrum():
+    times = sun_times(np.array([0.0, 0.0, 2.0, 5.0, 80.0]), 6)
+    assert times[0] == pytest.approx(4 * np.log(10) / 80)
+    assert times[-1] == pytest.approx(4 * np.log(10) / 2)
+    assert np.diff(np.log(times)) == pytest.approx(np.full(5, np.log(40) / 5))
 
 
 def test_signature_follows_the_eigenpairs_and_not_their_signs():
