@@ -16,10 +16,13 @@ def mm_icc(
 ) -> ContourAlignment:
     """Refine the poses of two or more views by MM-ICC.
 
-    As published with the residual ``"point"``: three prunings, trimmed ICP in 3D over all adjacent
-    views. That gets in from far but is off by half a pixel or so, as contour points slide along
-    the surface; with ``"normal"`` a few rounds follow that count only the distance across the
-    outline. All other settings are readings of the paper, or parts of it left out.
+    As published by default: three prunings and trimmed matches in 3D, over all adjacent views
+    together. What is minimised the paper does not say; as MM-ICC changes the prunings and the
+    matching of M-ICC and nothing else, it is taken to be M-ICC's distance in the image. The
+    distance in 3D (residual ``"point"``) is the other reading: contour points slide along the
+    surface, and their depth on an outline is nearly undetermined, so that it gets in from less far
+    and comes to rest half a pixel or more off. All other settings are readings of the paper too,
+    or leave parts of it out; ``"normal"`` is ours.
 
     Args:
         scans: All scans.

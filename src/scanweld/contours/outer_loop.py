@@ -33,7 +33,7 @@ NUM_OUTLINE_ROUNDS = 10
 """Renderings of the rounds across the outline."""
 OUTLINE_NOISE_PIXELS = 0.3
 """Standard deviation of an outline that is known to the pixel."""
-STILL_PIXELS = 0.02
+STILL_PIXELS = 0.05
 """The iteration has come to rest when a rendering moves no scan by more."""
 NUM_PROBES = 100
 """Vertices of a scan whose movement is looked at."""
@@ -137,7 +137,7 @@ def _match(
 
 
 def _pulls(matches: LinkMatches, poses: Mapping[int, Pose], config: ContoursConfig) -> Pulls:
-    return (image_pulls if config.residual == "image" else point_pulls)(matches, poses)
+    return (point_pulls if config.residual == "point" else image_pulls)(matches, poses)
 
 
 def _outline_rounds(
@@ -173,7 +173,7 @@ def _judged(
     num, square = 0, 0.0
     for matches in _match(links, poses, config):
         pulls = _pulls(matches, poses, config)
-        unit = 1.0 if config.residual == "image" else matches.link.pixel
+        unit = matches.link.pixel if config.residual == "point" else 1.0
         num += len(matches)
         square += float(pulls.residuals @ pulls.residuals) / unit**2
     return ContourAlignment(
