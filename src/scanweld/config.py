@@ -78,7 +78,7 @@ class PairsConfig(Section):
     """Turns about the normal that are tried for each pair of anchors."""
     tolerance_diameters: tuple[Positive, Positive, Positive] = (0.04, 0.02, 0.012)
     """Depth tolerance of the evidence, coarse to fine."""
-    num_survivors: tuple[Count, Count] = (400, 30)
+    num_survivors: tuple[Count, Count] = (1600, 100)
     """Hypotheses that go on to the first and to the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
     """Distinct poses that are kept for a pair."""
@@ -164,15 +164,16 @@ class ContoursConfig(Section):
     matching: Literal["trimmed", "mutual"] = "trimmed"
     """Closest observed points, the farthest left out (MM-ICC), or only pairs of points that are
     closest to each other (M-ICC)."""
-    trim: float | None = Field(default=None, gt=0, le=1)
+    trim: float | None = Field(default=0.7, gt=0, le=1)
     """Share of the contour matches that trimmed ICP keeps; found anew in each step if None."""
     num_renders: int = Field(default=20, ge=1)
     """Outer iterations: predicted range images are rendered anew in each."""
     num_steps: int = Field(default=3, ge=1)
     """Inner iterations between two renderings."""
-    residual: Literal["point", "image", "normal"] = "normal"
-    """What is minimised: the distance of contours in 3D (MM-ICC), in the image (M-ICC), or that in
-    3D followed by the distance across the outline in the image, which is unbiased."""
+    residual: Literal["image", "point", "normal"] = "image"
+    """What is minimised of the contours matched in 3D: their distance in the image, which is
+    M-ICC's and which the paper does not change; that in 3D, as in ICP; or, ours, that in the image
+    and then across the outline alone."""
 
 
 class RefineConfig(Section):
