@@ -11,7 +11,7 @@ from scanweld.geometry.arrays import ByteArray
 from scanweld.geometry.pose import Pose
 
 _TOP, _FOOT = 16, 92
-_HEAD, _GALLERY_FOOT = 64, 104
+_HEAD = 64
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -61,7 +61,7 @@ def draw_pair(scene: Scene, panels: Sequence[Panel], path: Path, cut_height: int
 
 
 def draw_four_views(
-    scenes: tuple[Scene, Scene],
+    scenes: tuple[Scene, Scene, Scene],
     panels: Sequence[Panel],
     heated: Sequence[ByteArray],
     path: Path,
@@ -70,13 +70,13 @@ def draw_four_views(
     """Figure 5: scans before registration, their heat and keypoints, and the steps after.
 
     Args:
-        scenes: The views at the size of the first panel, and of the others.
+        scenes: The views at the size of the first panel, of the others, and of the last one.
         panels: The first is before registration.
         heated: A picture of each scan.
         path: Of the PNG.
         cut_height: Of the cuts below the panels of the second row, in pixels.
     """
-    before, after = (scene.look.camera for scene in scenes)
+    before, after = scenes[0].look.camera, scenes[1].look.camera
     second = _TOP + before.height + _FOOT
     sheet = Sheet(WIDTH, second + after.height + cut_height + _FOOT)
     sheet.place(scenes[0].picture(_posed(panels[0])), 0, _TOP)
@@ -89,33 +89,28 @@ def draw_four_views(
         sheet.swatch(middle, foot + 36, SCANS[k % len(SCANS)])
     middle = before.width + 0.5 * (WIDTH - before.width)
     sheet.caption("b", "heat kernel signature and PA-HKS keypoints", middle, foot)
-    draw_row(sheet, scenes[1], panels[1:], "cdefgh", 0, second, cut_height)
+    draw_row(sheet, scenes[1], panels[1:-1], "cdefg", 0, second, cut_height)
+    last = len(panels) - 2
+    draw_row(sheet, scenes[2], panels[-1:], "cdefgh"[last:], last * after.width, second, cut_height)
     sheet.save(path)
 
 
 def draw_gallery(
-    rows: Sequence[tuple[str, Sequence[tuple[Scene, Panel]]]],
-    titles: Sequence[str],
-    path: Path,
-    cut_height: int,
+    scenes: Sequence[Scene], titles: Sequence[str], rows: Sequence[Sequence[Panel]], path: Path
 ) -> None:
-    """Figure 6: a column for each setting, a row for each method.
-
-    Args:
-        rows: Each method's name, and its result in each setting.
-        titles: Of the settings.
-        path: Of the PNG.
-        cut_height: Of the cut below each panel, in pixels.
-    """
-    size = rows[0][1][0][0].look.camera
-    step = size.height + cut_height + _GALLERY_FOOT
+    """Figure 6: a column for each scene, a row for each method and start."""
+    size = scenes[0].look.camera
+    step = size.height + _FOOT
     sheet = Sheet(len(titles) * size.width, _HEAD + len(rows) * step)
     for column, title in enumerate(titles):
         sheet.write(title, (column + 0.5) * size.width, 34)
-    for row, (_, panels) in enumerate(rows):
-        for column, (scene, panel) in enumerate(panels):
-            left, top = column * size.width, _HEAD + row * step
-            draw_row(sheet, scene, [panel], "", left, top, cut_height)
+    for row, panels in enumerate(rows):
+        top = _HEAD + row * step
+        for column, (scene, panel) in enumerate(zip(scenes, panels, strict=True)):
+            left = column * size.width
+            sheet.place(scene.picture(_posed(panel)), left, top)
+            middle, foot = left + 0.5 * size.width, top + size.height + 22
+            sheet.caption("", panel.text, middle, foot, panel.note)
     sheet.save(path)
 
 

@@ -10,7 +10,7 @@ from benchmarks.paper.drawing.bodies import balls, scan_body
 from benchmarks.paper.drawing.scene import look_at, render
 from benchmarks.paper.drawing.sheet import WIDTH, Sheet
 from benchmarks.paper.drawing.style import INK, QUIET, heat_colors
-from benchmarks.paper.heat_field import heat_field
+from benchmarks.paper.figures.heat_field import heat_field
 from scanweld.geometry.arrays import ByteArray
 from scanweld.geometry.prepared import PreparedScan
 

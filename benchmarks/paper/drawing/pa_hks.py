@@ -10,7 +10,7 @@ from benchmarks.paper.drawing.bodies import balls, scan_body, wired_body
 from benchmarks.paper.drawing.scene import Body, Look, look_at, render
 from benchmarks.paper.drawing.sheet import WIDTH, Sheet, draw_segments
 from benchmarks.paper.drawing.style import ACCENT, BACK_PLANE, CLAY, INK, SCANS, WALL
-from benchmarks.paper.heat_field import heat_field
+from benchmarks.paper.figures.heat_field import heat_field
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.prepared import PreparedScan
 

@@ -31,6 +31,7 @@ class Scene:
         height: Of a picture, in pixels.
         cut_at: Height of the cut, as a share of the object's.
         towards: Weights of the scans' viewing directions in the viewer's.
+        margin: Left free around the object, as a share of the picture's shorter side.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Scene:
         height: int,
         cut_at: float,
         towards: Sequence[float],
+        margin: float = 0.07,
     ) -> None:
         self.name, self.scans = name, scans
         self.up = np.array(_UPWARDS[UP[name]])
@@ -51,7 +53,7 @@ class Scene:
         way = np.sum(ways, axis=0)
         mesh = mesh_of(name)
         self.direction = way / np.linalg.norm(way) + _RAISED * self.up
-        self.look = look_at(mesh.vertices, self.direction, self.up, width, height, margin=0.07)
+        self.look = look_at(mesh.vertices, self.direction, self.up, width, height, margin)
         heights = mesh.vertices @ self.up
         self.level = float(heights.min() + cut_at * np.ptp(heights))
         self.mesh = mesh
@@ -82,17 +84,24 @@ class Scene:
         axes = sheet.axes(left, top, width, height)
         axes.set_xlim(0, width)
         axes.set_ylim(height, 0)
-        truth = self._cut(self.mesh.vertices, self.mesh.faces)
+        truth = self.object_cut()
         away = _RAISED * self.up - self.direction
         look = look_at(truth.reshape(-1, 3), self.up, away, width, height, margin=0.12)
         draw_segments(axes, _flat(truth, look), _TRUTH, _TRUTH_WIDTH)
         for k, pose in self.in_world(poses).items():
-            mesh = self.scans[k].scan.mesh
-            cut = self._cut(pose.apply(mesh.vertices), mesh.faces)
+            cut = self.scan_cut(k, pose)
             draw_segments(axes, _flat(cut, look), SCANS[k % len(SCANS)], _CUT_WIDTH)
 
+    def object_cut(self) -> FloatArray:
+        """Segments (N, 2, 3) of the object in the plane of the cut."""
+        return self._cut(self.mesh.vertices, self.mesh.faces)
+
+    def scan_cut(self, k: int, world_from_sensor: Pose) -> FloatArray:
+        """The same of a scan in a pose."""
+        mesh = self.scans[k].scan.mesh
+        return self._cut(world_from_sensor.apply(mesh.vertices), mesh.faces)
+
     def _cut(self, vertices: FloatArray, faces: IntArray) -> FloatArray:
-        """Segments (N, 2, 3) of a mesh in the plane of the cut."""
         mesh = Trimesh(vertices, faces, process=False)
         return np.asarray(mesh_plane(mesh, self.up, self.level * self.up)).reshape(-1, 2, 3)
 

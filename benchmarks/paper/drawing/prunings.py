@@ -67,7 +67,7 @@ def draw(i: VirtualScan, j: VirtualScan, result: Mapping[str, Any], path: Path) 
         for name, _, color in dots:
             wide = _BEHIND if name == "observed_kept" and column == 2 else _LINE
             pixels = np.array(result[name], np.int64).reshape(-1, 2)
-            lines = _in_look(_linked(pixels), j, look)
+            lines = _in_look(linked(pixels), j, look)
             draw_segments(axes, lines, color, wide * _scale(j, look))
         sheet.caption("abc"[column], text, middle, top)
         _legend(sheet, dots, result, column * width + 40, top + 38)
@@ -124,7 +124,7 @@ def _in_look(pixels: FloatArray, view: VirtualScan, look: Look) -> FloatArray:
     return scale * (pixels - centre) + np.array([look.camera.cx, look.camera.cy])
 
 
-def _linked(pixels: IntArray) -> FloatArray:
+def linked(pixels: IntArray) -> FloatArray:
     """Segments (N, 2, 2) between neighbouring pixels (M, 2); one without neighbours is a dot.
 
     Two pixels that touch at a corner are linked only where no third one links them anyway.

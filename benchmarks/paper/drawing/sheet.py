@@ -19,7 +19,8 @@ WIDTH = 1600
 _DPI = 100
 _TEXT, _SMALL = 27, 23
 """Heights of letters in pixels; figures are often shown at half their size."""
-_MOST_COLORS = 256
+_PALETTES = (256, 128, 64)
+_MOST_BYTES = 400_000
 
 
 class Sheet:
@@ -95,15 +96,12 @@ class Sheet:
         axes.plot(*zip(start, end, strict=True), color=(*QUIET, 0.35), lw=1.2)
 
     def save(self, path: Path) -> None:
-        """Write a PNG of few colours; a dither hides that."""
+        """Write a PNG of so many colours that the file stays small."""
         with rc_context({"font.family": "DejaVu Sans", "mathtext.fontset": "dejavusans"}):
             canvas = FigureCanvasAgg(self.figure)
             canvas.draw()
         pixels = np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
-        few = Image.fromarray(pixels).quantize(_MOST_COLORS, Image.Quantize.MEDIANCUT, kmeans=2)
-        buffer = io.BytesIO()
-        few.save(buffer, "PNG", optimize=True)
-        path.write_bytes(buffer.getvalue())
+        path.write_bytes(_png(Image.fromarray(pixels)))
 
 
 def draw_segments(axes: Axes, segments: FloatArray, color: FloatArray, width: float) -> None:
@@ -116,6 +114,21 @@ def draw_segments(axes: Axes, segments: FloatArray, color: FloatArray, width: fl
 def draw_dots(axes: Axes, pixels: FloatArray, color: FloatArray, width: float) -> None:
     """Draw dots of a width at pixels (N, 2) of the axes."""
     axes.scatter(*pixels.T, s=_points(width) ** 2, color=[tuple(color)], linewidths=0, zorder=3)
+
+
+def _png(image: Image.Image) -> bytes:
+    for colors in _PALETTES[:-1]:
+        png = _with_palette(image, colors)
+        if len(png) <= _MOST_BYTES:
+            return png
+    return _with_palette(image, _PALETTES[-1])
+
+
+def _with_palette(image: Image.Image, colors: int) -> bytes:
+    buffer = io.BytesIO()
+    few = image.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2)
+    few.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
 
 
 def _points(pixels: float) -> float:
