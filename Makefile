@@ -25,8 +25,9 @@ benchmarks: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/stress.py --few --seeds 1 --out docs/data/stress.json
 	$(BIN)/python benchmarks/pages.py
 
-# The paper's tables and figures beside ours, into docs/paper; needs the Stanford data, takes an hour
-# on 2 cores, and goes on where it was stopped. Without the data: make paper PAPER="--quick --out DIR".
+# The paper's tables and figures beside ours, into docs/paper; needs the Stanford data, takes up to
+# an hour on 2 cores, and goes on where it was stopped. In two minutes and without the data:
+# make paper PAPER="--quick --out paper"
 paper: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.paper $(PAPER)
 

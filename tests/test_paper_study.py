@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from benchmarks.paper import __main__ as command
-from benchmarks.paper import real_pairs, table1
+from benchmarks.paper import real_pairs, table1, trial
 from benchmarks.paper.methods import METHODS
+from benchmarks.paper.real_pairs_page import tell as tell_real_pairs
 from benchmarks.paper.study import Record, Study, Table, read_records
 from benchmarks.paper.success import Limit, auc, cell, share_right
 from benchmarks.paper.table1_page import tell
@@ -182,6 +183,23 @@ def test_the_papers_numbers_stand_only_beside_its_gaps(tmp_path: Path):
     assert line_with(page, "scanweld, any start").count("< 1") == 9
 
 
+def test_real_pairs_are_counted_by_overlap(tmp_path: Path):
+    def record(overlap: float, default: float, other: float) -> Record:
+        made = pair_record(60, overlap, None)
+        answers = {"default": answer(default, accepted=overlap > 0.2), "gicp": answer(other)}
+        return Record(unit=made.unit, result={"overlap": overlap, "answers": answers})
+
+    records = [record(0.3, 0.1, 4.0), record(0.16, 6.0, 9.0), record(0.12, 3.0, 90.0)]
+    page = tell_real_pairs(records, tmp_path)
+    from_015 = line_with(page, "- Overlap from 0.15")
+    assert "right in 1 of 2 pairs; of the others GICP does best, 1 of 2." in from_015
+    assert "right in 1 of 1 pairs" in line_with(page, "- Overlap 0.05-0.15")
+    assert "vouches for 1 answers; 0 are wrong" in page
+    rows = [line for line in page.splitlines() if line.startswith("| scanweld | ")]
+    assert rows[0] == "| scanweld | 1/1 0.10 | 0/1 | 1/1 3.00 |"
+    assert rows[1] == "| scanweld | 1/1 0.10 | 0/1 | 0/1 |"
+
+
 def test_shares_of_matches_are_pooled_over_the_azimuths(tmp_path: Path):
     def record(azimuth: int, **matches: float) -> Record:
         made = pair_record(40, 0.5, 0.1, protocol="identity", azimuth=azimuth)
@@ -283,15 +301,10 @@ def test_a_missing_library_names_the_extra(
     name: str, refused: Refusal, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setitem(sys.modules, "small_gicp", None)
-    for other in set(LIBRARIES) - {"small_gicp"}:
-        monkeypatch.setattr(f"{table1.missing_modules.__module__}.find_spec", _only(other))
+    monkeypatch.setattr(trial, "find_spec", lambda module: module != "small_gicp" or None)
     line = refused("--only", name)
     assert "small_gicp" in line
     assert "pip install 'scanweld[bench]'" in line
-
-
-def _only(present: str) -> Callable[[str], object | None]:
-    return lambda module: None if module == "small_gicp" else present
 
 
 def test_pages_of_what_was_not_measured_say_so(refused: Refusal):

@@ -23,6 +23,8 @@ from benchmarks.paper.success import Limit, auc, cell, share_right
 BASIN = Limit(deg=5, percent=2)
 TIGHT = Limit(deg=2, percent=1)
 BINS = ((0.4, 1.01), (0.25, 0.4), (0.15, 0.25), (0.10, 0.15), (0.05, 0.10), (0.0, 0.05))
+HALVES = ((0.15, 1.01), (0.05, 0.15), (0.0, 0.05))
+"""What the words speak of."""
 _PLOT = "real_pairs.png"
 _STARTS = """\
 Methods that need a start begin at a random rotation, with the middles of both scans on each other.
@@ -44,6 +46,8 @@ def tell(records: Sequence[Record], out: Path) -> str:
     objects = values(records, "object")
     parts = [
         _introduction(records, objects),
+        "## What it shows\n",
+        _words(records),
         f"![Share of pairs in the right basin by overlap]({_PLOT})\n",
         f"## In the right basin: {BASIN}\n",
         "Right of all, and the median rotation error of the right ones in degrees.\n",
@@ -65,6 +69,30 @@ def _introduction(records: Sequence[Record], objects: Sequence[str]) -> str:
     counts = ", ".join(f"{len(of(records, object=name))} of the {name}" for name in objects)
     text = _STAND_INS if objects == ["creature"] else _REAL
     return f"{len(records)} pairs: {counts}. {text}{sentence_on_missing(records)}"
+
+
+def _words(records: Sequence[Record]) -> str:
+    """The default beside the best of the others, counted from the records."""
+    others = [m for m in ORDER if m != "default" and told_by(records, m)]
+    lines = []
+    for low, high in HALVES:
+        inside = overlapping(records, low, high)
+        if inside:
+            best = max(others, key=lambda m: share_right(told_by(inside, m), BASIN))
+            lines.append(
+                f"- Overlap {overlap_title(low, high)}: the default is right in "
+                f"{_count(inside, 'default')} pairs; of the others {METHODS[best].title} does "
+                f"best, {_count(inside, best)}."
+            )
+    accepted = [told for told in told_by(records, "default") if told["accepted"]]
+    num_wrong = sum(not BASIN.holds(told) for told in accepted)
+    lines.append(f"- The default vouches for {len(accepted)} answers; {num_wrong} are wrong.")
+    return "\n".join(lines) + "\n"
+
+
+def _count(records: Sequence[Record], method: str) -> str:
+    told = told_by(records, method)
+    return f"{sum(BASIN.holds(each) for each in told)} of {len(told)}"
 
 
 def _by_overlap(records: Sequence[Record], limit: Limit) -> str:
