@@ -130,13 +130,16 @@ def true_poses(scans: Sequence[VirtualScan]) -> dict[int, Pose]:
 
 
 def start_poses(scans: Sequence[VirtualScan], degrees: float, seed: int) -> dict[int, Pose]:
-    """The true poses, every scan but the first turned about its middle."""
+    """The true poses, every scan but the first turned about its middle.
+
+    Two neighbours in a ring that are both turned start up to twice as far off.
+    """
     true = true_poses(scans)
     turned = {
         k: disturbed(true[k], scans[k].centre(), degrees, seed * 10 + k)
         for k in range(1, len(scans))
     }
-    return {0: true[0], **turned}
+    return true | turned
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -68,7 +68,9 @@ def measure(unit: Unit) -> Result:
             name: [_error(i, j, degrees, unit["azimuth"], change) for degrees in unit["starts"]]
             for name, change in VARIANTS.items()
         },
-        "apart": {name: _apart(i, j, ContoursConfig(prunings=p)) for name, p in PRUNED.items()},
+        "apart": {
+            name: contours_apart(i, j, ContoursConfig(prunings=p)) for name, p in PRUNED.items()
+        },
     }
 
 
@@ -84,7 +86,7 @@ def _error(
     return {"deg": deg, "percent": shift}
 
 
-def _apart(i: VirtualScan, j: VirtualScan, config: ContoursConfig) -> list[float]:
+def contours_apart(i: VirtualScan, j: VirtualScan, config: ContoursConfig) -> list[float]:
     """Percentiles of the distance in pixels from predicted to observed contours, at the truth."""
     a, b = observe_contours(i.scan, config), observe_contours(j.scan, config)
     pairs = (

@@ -54,13 +54,13 @@ def measure(unit: Unit) -> Result:
         found = [describe(view.scan, HeatConfig(**change)) for view in pair]
         result[name] = {
             "keypoints": [len(features) for features in found],
-            "repeated": _repeated(pair, found),
-            "matched": _matched(pair, found),
+            "repeated": repeated(pair, found),
+            "matched": matched(pair, found),
         }
     return result
 
 
-def _repeated(pair: Sequence[VirtualScan], found: Sequence[Features]) -> list[float]:
+def repeated(pair: Sequence[VirtualScan], found: Sequence[Features]) -> list[float]:
     """Keypoints that the other view sees, and has; by chance, evenly spread samples do."""
     reach = REPEATED_DIAMETERS * pair[0].diameter
     totals = np.zeros(3)
@@ -76,7 +76,7 @@ def _repeated(pair: Sequence[VirtualScan], found: Sequence[Features]) -> list[fl
     return [float(total) for total in totals]
 
 
-def _matched(pair: Sequence[VirtualScan], found: Sequence[Features]) -> list[float]:
+def matched(pair: Sequence[VirtualScan], found: Sequence[Features]) -> list[float]:
     """Matches of eq. 1 with the median as threshold; by chance, any keypoint is as likely."""
     i, j = pair
     of_i, of_j = found

@@ -228,12 +228,12 @@ def _evidence_section(records: Sequence[Record]) -> str:
     rows = [
         [
             name,
-            *(_share(_rescored(group, score)[0]) for group in groups.values()),
-            f"{_rescored(records, score)[1]:.3f}",
+            *(_share(rescored(group, score)[0]) for group in groups.values()),
+            f"{rescored(records, score)[1]:.3f}",
         ]
         for name, score in SCORES.items()
     ]
-    full, bare = (_rescored(records, SCORES[name]) for name in ("as it stands", "agreement alone"))
+    full, bare = (rescored(records, SCORES[name]) for name in ("as it stands", "agreement alone"))
     return (
         "## Terms of the evidence\n\n"
         f"**Agreement alone puts the right pose first in {_share(bare[0])} of the pairs (AUC "
@@ -245,7 +245,7 @@ def _evidence_section(records: Sequence[Record]) -> str:
     )
 
 
-def _rescored(
+def rescored(
     records: Sequence[Record], score: Callable[[Evidence], float]
 ) -> tuple[list[bool], float]:
     """Whether the best pose of each pair is right, and the AUC over all poses kept."""
