@@ -1,0 +1,331 @@
+"""M-ICC and MM-ICC: two and four views together, readings of the paper, invariances."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from scanweld.config import ContoursConfig, PrepareConfig
+from scanweld.contours.coherence import ContourPair, contour_pair
+from scanweld.contours.contour_sets import observe_contours
+from scanweld.contours.joint_solve import Pulls, cost_of, levenberg_marquardt
+from scanweld.contours.links import LinkMatches, match_mutual, match_trimmed, render_links
+from scanweld.contours.m_icc import m_icc
+from scanweld.contours.mm_icc import mm_icc
+from scanweld.contours.outer_loop import ContourAlignment
+from scanweld.contours.residuals import image_pulls, point_pulls
+from scanweld.evaluation.views import ring_of_views
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.camera import CameraModel
+from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.prepare import prepare
+from tests.prepared import creature_pair, scaled
+from tests.scenes import scene_of, small_creature
+
+PUBLISHED = ContoursConfig(jump_pixels=6.0, num_renders=10)
+METHODS = {"m_icc": m_icc, "mm_icc": mm_icc}
+RING = [(0, 1), (1, 2), (2, 3), (3, 0)]
+PAIR = [(0, 1)]
+PullsOf = Callable[[LinkMatches, Mapping[int, Pose]], Pulls]
+FEW = {"num_renders": 3}
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Views around the creature, and ``world_from_sensor``."""
+
+    scans: tuple[PreparedScan, ...]
+    truth: dict[int, Pose]
+
+    def off_by(self, poses: dict[int, Pose]) -> tuple[float, float]:
+        """Worst error of any view against the first: degrees, and share of the diameter."""
+        gauge = self.truth[0] @ poses[0].inverse()
+        angles, shifts = [], []
+        for k in poses:
+            off = self.truth[k].inverse() @ gauge @ poses[k]
+            angles.append(off.angle_deg())
+            shifts.append(off.shift_at(middle(self.scans[k])) / self.scans[k].diameter)
+        return max(angles), max(shifts)
+
+    def disturbed(self, degrees: float, seed: int = 0) -> dict[int, Pose]:
+        """All views but the first turned about their middles, each about its own axis."""
+        rng, poses = np.random.default_rng(seed), dict(self.truth)
+        for k in list(poses)[1:]:
+            axis = rng.normal(size=3)
+            poses[k] = turned(poses[k], degrees * axis / np.linalg.norm(axis), self.scans[k])
+        return poses
+
+
+def middle(scan: PreparedScan) -> FloatArray:
+    return scan.mesh.vertices.mean(axis=0)
+
+
+def turned(pose: Pose, degrees: FloatArray, scan: PreparedScan) -> Pose:
+    rotation = rotation_exp(np.radians(degrees))
+    centre = pose.apply(middle(scan))
+    return Pose(rotation=rotation, translation=centre - rotation @ centre) @ pose
+
+
+@lru_cache
+def ring(num: int = 4, model: CameraModel = CameraModel.PINHOLE, factor: float = 1.0) -> Ring:
+    """Views at 90 degrees; with fewer than four, the first of them."""
+    mesh = small_creature()
+    views = ring_of_views(mesh, 4, 10.0, pixels=140, model=model)[:num]
+    scans = scene_of(mesh, views, in_sensor_frames=True).scans
+    truth = {
+        k: Pose(
+            rotation=view.world_from_sensor.rotation,
+            translation=factor * view.world_from_sensor.translation,
+        )
+        for k, view in enumerate(views)
+    }
+    prepared = tuple(prepare(scaled(scan, factor), PrepareConfig()) for scan in scans)
+    return Ring(scans=prepared, truth=truth)
+
+
+def refine(
+    method: str,
+    views: Ring,
+    start: Mapping[int, Pose],
+    edges: Sequence[tuple[int, int]] = RING,
+    config: ContoursConfig = PUBLISHED,
+) -> ContourAlignment:
+    return METHODS[method](views.scans, start, edges, config)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("num", [2, 4])
+def test_truth_stays_and_is_found_again(method: str, num: int):
+    """Two views at 90 degrees, or four together: the creature is round, its contours weak."""
+    views, edges = ring(num), PAIR if num == 2 else RING
+    degrees_allowed, pixels_allowed = (2.5, 1.5) if num == 2 else (4.5, 3.0)
+    config = PUBLISHED.model_copy(update={"num_renders": 20})
+    pixel = views.scans[0].image.pixel / views.scans[0].diameter
+    for degrees in (0.0, 10.0):
+        start = views.disturbed(degrees)
+        aligned = refine(method, views, start, edges, config)
+        angle, shift = views.off_by(dict(aligned.poses))
+        assert angle < degrees_allowed
+        assert shift < pixels_allowed * pixel
+        assert aligned.poses[0] is start[0]
+        assert aligned.loose == ()
+        assert aligned.num_matches > 50 * len(edges)
+
+
+def test_orthographic_views_are_refined_too():
+    views = ring(2, CameraModel.ORTHOGRAPHIC)
+    for method in METHODS:
+        aligned = refine(method, views, views.disturbed(10.0), PAIR)
+        angle, shift = views.off_by(dict(aligned.poses))
+        assert angle < 4.0
+        assert shift < 0.015
+
+
+def test_views_together_close_the_ring():
+    """Each edge alone leaves a gap at the end of the ring; all together share it out."""
+    views = ring(4)
+    start = views.disturbed(10.0)
+    together = refine("mm_icc", views, start).poses
+    apart = views.truth[0]
+    for i, j in RING:
+        alone = refine("mm_icc", views, start, [(i, j)]).poses
+        apart = apart @ alone[i].inverse() @ alone[j]
+    gap = views.truth[0].inverse() @ apart
+    assert gap.angle_deg() > 0.3
+    product = Pose.identity()
+    for i, j in RING:
+        product = product @ together[i].inverse() @ together[j]
+    assert product.angle_deg() < 1e-6
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_moving_all_poses_moves_the_answer(method: str):
+    views = ring(2)
+    rng = np.random.default_rng(5)
+    motion = Pose(rotation=random_rotation(rng), translation=rng.uniform(-300, 300, 3))
+    start = views.disturbed(10.0)
+    here = refine(method, views, start, PAIR).poses
+    there = refine(method, views, {k: motion @ pose for k, pose in start.items()}, PAIR).poses
+    off = (motion @ here[1]).inverse() @ there[1]
+    assert off.angle_deg() < 0.3
+    assert off.shift_at(middle(views.scans[1])) < 0.3 * views.scans[1].image.pixel
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_swapped_scans_give_the_inverse(method: str):
+    views = ring(2)
+    start = views.disturbed(10.0)
+    forth = refine(method, views, start, PAIR).poses
+    swapped = Ring(scans=views.scans[::-1], truth={0: start[1], 1: start[0]})
+    back = refine(method, swapped, swapped.truth, PAIR).poses
+    off = forth[0].inverse() @ forth[1] @ back[0].inverse() @ back[1]
+    assert off.angle_deg() < 1.0
+    assert off.shift_at(middle(views.scans[0])) < 0.7 * views.scans[0].image.pixel
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_unit_of_length_does_not_matter(method: str):
+    """A power of two leaves every digit as it is."""
+    small, large = ring(2), ring(2, factor=1024.0)
+    a = refine(method, small, small.disturbed(10.0), PAIR)
+    b = refine(method, large, large.disturbed(10.0), PAIR)
+    np.testing.assert_allclose(a.poses[1].rotation, b.poses[1].rotation, atol=1e-3)
+    assert b.rms == pytest.approx(a.rms, rel=0.02)
+    assert b.coherence == pytest.approx(a.coherence, abs=0.02)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_same_bytes_each_time(method: str):
+    views = ring(4)
+    first, second = (
+        refine(method, views, views.disturbed(10.0), RING, PUBLISHED.model_copy(update=FEW))
+        for _ in range(2)
+    )
+    for k in first.poses:
+        assert first.poses[k].matrix().tobytes() == second.poses[k].matrix().tobytes()
+
+
+def test_too_few_contours_leave_a_view_and_say_so():
+    """A view far off has nothing in common with the others: they are refined without it."""
+    views = ring(4)
+    start = views.disturbed(5.0)
+    away = Pose(rotation=np.eye(3), translation=np.array([0.0, 0.0, 1e4]))
+    start[2] = away @ start[2]
+    for method in sorted(METHODS):
+        aligned = refine(method, views, start, [(0, 1), (1, 2), (0, 3)])
+        assert aligned.loose == (2,)
+        np.testing.assert_array_equal(aligned.poses[2].matrix(), start[2].matrix())
+        near = {k: aligned.poses[k] for k in (0, 1, 3)}
+        assert method == "m_icc" or views.off_by(near)[0] < 2.5
+
+
+def test_each_part_of_the_edges_keeps_its_first_view():
+    views = ring(4)
+    start = views.disturbed(5.0)
+    aligned = refine("mm_icc", views, start, [(1, 0), (2, 3)])
+    for k in (0, 2):
+        np.testing.assert_array_equal(aligned.poses[k].matrix(), start[k].matrix())
+    assert all((aligned.poses[k].inverse() @ start[k]).angle_deg() > 1.0 for k in (1, 3))
+
+
+def test_edges_need_poses():
+    views = ring(2)
+    for edges in ([(0, 2)], [(1, 1)]):
+        with pytest.raises(ValueError, match="needs two scans that both have a pose"):
+            refine("mm_icc", views, views.truth, edges)
+
+
+def all_matches(views: Ring, poses: Mapping[int, Pose]) -> list[LinkMatches]:
+    """Mutual matches of both links of the first edge."""
+    observed = {k: observe_contours(views.scans[k], PUBLISHED) for k in (0, 1)}
+    links = render_links(observed, poses, PAIR, PUBLISHED)
+    return [match_mutual(each, poses[each.j].inverse() @ poses[each.i]) for each in links]
+
+
+@pytest.mark.parametrize("pulls_of", [image_pulls, point_pulls])
+def test_levenberg_marquardt_only_goes_down(pulls_of: PullsOf):
+    """Each step accepted lowers the cost, and no small motion lowers it any further."""
+    views = ring(2)
+    start = views.disturbed(20.0)
+    matches = all_matches(views, start)
+
+    def at(poses: Mapping[int, Pose]) -> list[Pulls]:
+        return [pulls_of(each, poses) for each in matches]
+
+    arm = views.scans[0].diameter / 3
+    found, costs = levenberg_marquardt(at, start, frozenset({0}), arm)
+    assert len(costs) > 2
+    assert all(b < a for a, b in pairwise(costs))
+    assert costs[-1] < 0.5 * costs[0]
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        nearby = {**found, 1: turned(found[1], rng.normal(size=3), views.scans[1])}
+        assert cost_of(at(nearby)) > costs[-1]
+
+
+@pytest.mark.parametrize("model", [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC])
+@pytest.mark.parametrize("pulls_of", [image_pulls, point_pulls])
+def test_pulls_are_gradients(pulls_of: PullsOf, model: CameraModel):
+    """A shift of the predicting view changes the residuals as the directions say."""
+    views = ring(2, model)
+    poses = views.disturbed(10.0)
+    match = all_matches(views, poses)[0]
+    step = 1e-5 * views.scans[0].diameter * np.array([0.3, -0.5, 0.8])
+    shifted = Pose(rotation=np.eye(3), translation=step) @ poses[match.link.i]
+    before, after = pulls_of(match, poses), pulls_of(match, {**poses, match.link.i: shifted})
+    np.testing.assert_allclose(
+        after.residuals - before.residuals, before.directions @ step, rtol=1e-3, atol=1e-6
+    )
+
+
+def test_mutual_matches_are_one_to_one_and_trimmed_ones_the_closest():
+    views = ring(2)
+    poses = views.disturbed(10.0)
+    observed = {k: observe_contours(views.scans[k], PUBLISHED) for k in (0, 1)}
+    link = render_links(observed, poses, PAIR, PUBLISHED)[0]
+    j_from_i = poses[link.j].inverse() @ poses[link.i]
+    mutual = match_mutual(link, j_from_i)
+    assert len(set(mutual.observed.tolist())) == len(mutual)
+    everything = link.pair.observed.points
+    moved = j_from_i.apply(mutual.points)
+    apart = np.linalg.norm(moved[:, None] - everything[None], axis=2)
+    np.testing.assert_array_equal(apart.argmin(axis=1), mutual.observed)
+    kept = match_trimmed(link, j_from_i, 0.6)
+    assert len(kept) == int(np.ceil(0.6 * len(link.points)))
+    distance = np.linalg.norm(j_from_i.apply(kept.points) - everything[kept.observed], axis=1)
+    whole = match_trimmed(link, j_from_i, 1.0)
+    every = np.linalg.norm(j_from_i.apply(whole.points) - everything[whole.observed], axis=1)
+    assert distance.max() <= np.sort(every)[len(kept) - 1] + 1e-9
+
+
+def kept_by(**settings: object) -> tuple[set[tuple[int, ...]], ContourPair]:
+    """Predicted contour pixels, first scan in the second's camera at 60 degrees, at the truth."""
+    pair = creature_pair(60)
+    i, j = (observe_contours(scan, PUBLISHED) for scan in pair.scans)
+    config = PUBLISHED.model_copy(update=settings)
+    contours = contour_pair(i, j, pair.i_from_j.inverse(), config)
+    return {tuple(pixel) for pixel in contours.predicted.pixels.tolist()}, contours
+
+
+def off_contour(contours: ContourPair) -> float:
+    """Share of the predicted contours that lie farther than two pixels from the observed."""
+    distance, _ = KDTree(contours.observed.pixels).query(contours.predicted.pixels)
+    return float((distance > 2).mean())
+
+
+def test_any_subset_of_the_prunings():
+    """Each pruning only takes away; what eqs 4 and 6 take away is mostly false."""
+    none, everything = kept_by(prunings=())
+    first, _ = kept_by(prunings=("self-occlusion",))
+    third, _ = kept_by(prunings=("predicted",))
+    both, left = kept_by(prunings=("self-occlusion", "predicted"))
+    assert first < none
+    assert third < none
+    assert both == first & third
+    assert off_contour(left) < 0.6 * off_contour(everything)
+    _, second = kept_by(prunings=("observed",))
+    assert len(second.observed) < len(everything.observed)
+    assert len(second.predicted) == len(everything.predicted)
+
+
+@pytest.mark.parametrize("reading", ["face", "depth", "observed normal", "printed"])
+def test_readings_of_the_third_pruning(reading: str):
+    """All take points away from the first, none adds any."""
+    first, _ = kept_by(prunings=("self-occlusion",))
+    kept, _ = kept_by(prunings=("self-occlusion", "predicted"), predicted_visibility=reading)
+    assert kept <= first
+    assert len(kept) > 0.3 * len(first)
+
+
+def test_readings_of_the_first_pruning():
+    """By the rim's triangles or by the place in space: nearly the same points go."""
+    none, _ = kept_by(prunings=())
+    border, _ = kept_by(prunings=("self-occlusion",), self_occlusion="border")
+    place, _ = kept_by(prunings=("self-occlusion",), self_occlusion="place")
+    assert place < none
+    assert len(border ^ place) < 0.35 * len(none)
