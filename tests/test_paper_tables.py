@@ -164,7 +164,7 @@ def test_the_sweep_says_when_another_tuning_does_better():
             for method in table2.SWEEP
             for tuning, num in (
                 (table2.TUNED[method], num_used),
-                ({**table2.TUNED[method], "renders": 40}, num_other),
+                ({**table2.TUNED[method], "renders": 30}, num_other),
             )
         ]
         result = {"azimuths_deg": [0.0], "diameter": 200.0}
@@ -172,7 +172,7 @@ def test_the_sweep_says_when_another_tuning_does_better():
         return table2.page([*seven({}), *sweep], Path())
 
     assert "MM-ICC takes the bold setting; no other does better" in swept(3, 3)
-    assert "40" in swept(2, 3).split("MM-ICC takes the bold setting; ")[1].split("does better")[0]
+    assert "30" in swept(2, 3).split("MM-ICC takes the bold setting; ")[1].split("does better")[0]
 
 
 def test_rescoring_ranks_kept_poses_anew():

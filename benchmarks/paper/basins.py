@@ -168,9 +168,8 @@ def _plot(
         panel.spines[["top", "right"]].set_visible(False)
     panels[0][0].set_ylabel("right poses, %")
     handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="lower center", ncols=len(methods), frameon=False, fontsize=9
-    )
-    figure.tight_layout(rect=(0, 0.07, 1, 1))
+    columns = (len(methods) + 1) // 2
+    figure.legend(handles, labels, loc="lower center", ncols=columns, frameon=False, fontsize=9)
+    figure.tight_layout(rect=(0, 0.13, 1, 1))
     figure.savefig(path, dpi=110, metadata={"Software": None})
     pyplot.close(figure)
