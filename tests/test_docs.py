@@ -9,6 +9,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from benchmarks.paper import ablations, method_reasons
 from benchmarks.paper.method_numbers import NUMBERS
 from benchmarks.paper.method_page import PLACE, TEMPLATE, Results, constant, method_text
 from benchmarks.paper.pages import write_page
@@ -73,6 +74,15 @@ def test_method_template_names_numbers_and_constants_that_are_there():
     for equals, path in places:
         assert not equals or constant(path)
     assert TEMPLATE.read_text(encoding="utf-8").count("{{") == len(places)
+
+
+def test_reasons_ask_for_variants_that_the_ablations_measure():
+    assert set(method_reasons._CONTOURS.values()) <= set(ablations.contours.VARIANTS)
+    assert set(method_reasons._HEAT.values()) <= set(ablations.heat.VARIANTS)
+    assert set(method_reasons._COARSE.values()) <= set(ablations.coarse.VARIANTS)
+    assert set(method_reasons._SCORES.values()) <= set(ablations.search.SCORES)
+    terms = {ablations.terms.ALONE, *ablations.terms.WEIGHTS}
+    assert set(method_reasons._TERMS.values()) <= terms
 
 
 @pytest.mark.parametrize("path", ["heat.keypoints._NO_SUCH", "Config.heat.no_such", "no.such.X"])

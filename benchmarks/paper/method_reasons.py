@@ -47,6 +47,8 @@ def _contours(results: Results, variant: str) -> str:
 def _contour_error(results: Results, variant: str) -> str:
     """Median error of these, in degrees and in % of the diameter."""
     told = [e for e in _contour_runs(results, variant) if contours.CONVERGED.holds(e)]
+    if not told:
+        return "-"
     deg, shift = (np.median([e[key] for e in told]) for key in ("deg", "percent"))
     return f"{deg:.2f} deg and {shift:.2f} %"
 
@@ -110,6 +112,8 @@ _CONTOURS = {
     "eq6-printed": "eq. 6 as printed",
     "mutual": "mutual matches",
     "untrimmed": "all matches, untrimmed",
+    "image": "distance in the image",
+    "point": "distance in space",
     "outline": "then across the outline",
 }
 _HEAT = {
@@ -145,8 +149,10 @@ REASONS: dict[str, Reason] = {
     "far-start": lambda _: str(FAR_START),
     "terms-gaps": _gaps,
     "terms-start": lambda _: f"{terms.START_DEG:g}",
-    "outline-error": partial(_contour_error, variant=_CONTOURS["outline"]),
-    "published-error": partial(_contour_error, variant=_CONTOURS["published"]),
+    **{
+        f"{name}-error": partial(_contour_error, variant=_CONTOURS[name])
+        for name in ("image", "point", "outline")
+    },
     "apart-none": partial(_apart, prunings="none"),
     "apart-12": partial(_apart, prunings="1 and 2"),
     "apart-123": partial(_apart, prunings="1, 2 and 3"),

@@ -37,6 +37,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "eq. 6 as printed": {"predicted_visibility": "printed"},
     "mutual matches": {"matching": "mutual"},
     "all matches, untrimmed": {"trim": 1.0},
+    "distance in the image": {"residual": "image"},
+    "distance in space": {"residual": "point"},
     "then across the outline": {"residual": "normal"},
 }
 """What is changed against MM-ICC as published: face normals in eq. 6, trimmed matches."""
@@ -77,7 +79,7 @@ def measure(unit: Unit) -> Result:
 def _error(
     i: VirtualScan, j: VirtualScan, degrees: float, seed: int, change: dict[str, Any]
 ) -> dict[str, float]:
-    config = ContoursConfig(**{"residual": "point", **change})
+    config = ContoursConfig(**change)
     start = disturbed(i.from_other(j), j.centre(), degrees, seed)
     at_start = {0: Pose.identity(), 1: start}
     poses = mm_icc((i.scan, j.scan), at_start, [(0, 1)], config).poses
