@@ -222,7 +222,7 @@ def test_the_page_shows_pictures_that_stand_and_numbers_of_the_records(
 
 
 def test_a_gallery_says_how_many_runs_are_right(tmp_path: Path):
-    unit = {"figure": "gallery", "setting": "quick", "start_deg": 20, "seeds": 1}
+    unit = next(unit for unit in figures.units(quick=True) if unit["figure"] == "gallery")
     record = Record(unit=unit, result=figures.measure(unit))
     for method in ("m-icc", "mm-icc"):
         result = record.result[method]

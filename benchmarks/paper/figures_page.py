@@ -186,7 +186,7 @@ def _draw_four_views(records: Sequence[Record], out: Path) -> str:
     )
     azimuths = ", ".join(f"{a:.0f}°" for a in record.result["azimuths_deg"])
     keypoints = ", ".join(str(number) for number in record.result["keypoints"])
-    told = "; ".join(f"{p.text}: {p.note}" for p in panels[1:])
+    told = "; ".join(f"{p.text}: {p.note.removeprefix('RMS ')}" for p in panels[1:])
     return _figure(
         "Figure 5: four views, 90° apart",
         "fig5-four-views.png",

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.paper.baselines.own import AS_PUBLISHED
 from benchmarks.paper.figures.heat_field import heat_field
 from benchmarks.paper.figures.subjects import subject
 from benchmarks.paper.methods import METHODS, ScanPair
@@ -46,7 +47,7 @@ def units(quick: bool) -> list[Unit]:
             {"figure": "pa-hks", "subject": "creature", "azimuth_deg": 60.0},
             {"figure": "prunings", "object": "creature", "azimuths_deg": [45.0, 105.0]},
             {"figure": "heat", "object": "creature", "azimuths_deg": [60.0, 90.0]},
-            {"figure": "gallery", "setting": "quick", "start_deg": 20, "seeds": 1},
+            _gallery_unit("quick", 20, seeds=1),
         ]
     return [
         {"figure": "pa-hks", "subject": "armadillo", "azimuth_deg": 180.0},
@@ -57,12 +58,22 @@ def units(quick: bool) -> list[Unit]:
         {"figure": "four views", "setting": "vii"},
         {"figure": "heat", "object": "armadillo", "azimuths_deg": [120.0, 160.0, 200.0, 240.0]},
         *(
-            {"figure": "gallery", "setting": numeral, "start_deg": degrees, "seeds": NUM_SEEDS}
+            _gallery_unit(numeral, degrees, NUM_SEEDS)
             for degrees in GALLERY_START_DEG
             for numeral in SETTINGS
             if numeral != "quick"
         ),
     ]
+
+
+def _gallery_unit(numeral: str, degrees: int, seeds: int) -> Unit:
+    return {
+        "figure": "gallery",
+        "setting": numeral,
+        "start_deg": degrees,
+        "seeds": seeds,
+        "tuning": {name: dict(TUNED[name]) for name in ("m-icc", "mm-icc")},
+    }
 
 
 def measure(unit: Unit) -> Result:
@@ -218,8 +229,8 @@ def _gallery(unit: Unit) -> Result:
         "diameter": views[0].diameter,
     }
     for name, align in (("m-icc", m_icc), ("mm-icc", mm_icc)):
-        tuning = TUNED[name]
-        config = ContoursConfig(residual="point").model_copy(
+        tuning = unit["tuning"][name]
+        config = AS_PUBLISHED.model_copy(
             update={
                 "jump_pixels": tuning["tau"],
                 "num_renders": tuning["renders"],
