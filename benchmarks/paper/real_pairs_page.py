@@ -73,21 +73,24 @@ def _introduction(records: Sequence[Record], objects: Sequence[str]) -> str:
 
 def _words(records: Sequence[Record]) -> str:
     """The default beside the best of the others, counted from the records."""
-    others = [m for m in ORDER if m != "default" and told_by(records, m)]
     lines = []
     for low, high in HALVES:
         inside = overlapping(records, low, high)
         if inside:
-            best = max(others, key=lambda m: share_right(told_by(inside, m), BASIN))
-            lines.append(
-                f"- Overlap {overlap_title(low, high)}: the default is right in "
-                f"{_count(inside, 'default')} pairs; of the others {METHODS[best].title} does "
-                f"best, {_count(inside, best)}."
-            )
+            told = f"the default is right in {_count(inside, 'default')} pairs"
+            lines.append(f"- Overlap {overlap_title(low, high)}: {told}; {_best_other(inside)}.")
     accepted = [told for told in told_by(records, "default") if told["accepted"]]
     num_wrong = sum(not BASIN.holds(told) for told in accepted)
     lines.append(f"- The default vouches for {len(accepted)} answers; {num_wrong} are wrong.")
     return "\n".join(lines) + "\n"
+
+
+def _best_other(records: Sequence[Record]) -> str:
+    others = [m for m in ORDER if m != "default" and told_by(records, m)]
+    best = max(others, key=lambda method: share_right(told_by(records, method), BASIN))
+    if not share_right(told_by(records, best), BASIN):
+        return "no other method is right in any"
+    return f"of the others {METHODS[best].title} does best, {_count(records, best)}"
 
 
 def _count(records: Sequence[Record], method: str) -> str:
