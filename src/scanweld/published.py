@@ -1,10 +1,9 @@
 """Scans -> reconstruction by the method as published: PA-HKS and ICP, then MM-ICC.
 
 The readings of the paper are settings, ``coarse`` and ``contours``; nothing else finds or moves a
-pose. (By default MM-ICC ends with a few rounds across the outline; the contours' residual "point"
-leaves them out.) What the paper takes for granted is added: it is told which views are adjacent,
-and does not ask whether its answer is right. Here the evidence of the pairs says both, as it does
-for the robust method.
+pose. What the paper takes for granted is added: it is told which views are adjacent, and does not
+ask whether its answer is right. Here the evidence of the pairs says both, as it does for the
+robust method.
 """
 
 from collections.abc import Mapping, Sequence
