@@ -79,8 +79,8 @@ first. Methods of libraries that make nothing of the start are tried from any st
     if noise:
         text += (
             f"Noise, where there is any, has a standard deviation of {small_percent(noise)} of the "
-            "diameter in depth, and more towards grazing rays; fewer methods and azimuths are tried "
-            "with it, and the default from any start only.\n"
+            "diameter in depth, and more towards grazing rays; with it fewer methods and azimuths "
+            "are tried, and the default from any start only.\n"
         )
     return f"""{text}{sentence_on_missing(records)}
 An answer is *right* if it is less than 1° and, at the middle of the second scan, less than 1 % of
