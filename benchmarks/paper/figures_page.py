@@ -8,7 +8,6 @@ from benchmarks.paper.drawing import assemblies, heat_colors, pa_hks, prunings
 from benchmarks.paper.drawing.assemblies import Panel
 from benchmarks.paper.drawing.placed import Scene
 from benchmarks.paper.drawing.sheet import WIDTH
-from benchmarks.paper.figures.heat_field import heat_field
 from benchmarks.paper.figures.subjects import subject
 from benchmarks.paper.methods import METHODS
 from benchmarks.paper.pages import percent
@@ -178,7 +177,7 @@ def _draw_four_views(records: Sequence[Record], out: Path) -> str:
     small = Scene(setting.name, views, 420, 420, cut, towards)
     size = (WIDTH // (len(panels) - 1), 500)
     large = Scene(setting.name, views, *size, cut, towards)
-    index, extent = _middle_time(views)
+    index, extent = record.result["heat"]["index"], record.result["heat"]["range"]
     heated = [heat_colors.heated(view.scan, index, extent, 280, 420) for view in views]
     behind = Scene(setting.name, views, *size, cut, (-1.0, -0.55))
     assemblies.draw_four_views(
@@ -198,15 +197,6 @@ def _draw_four_views(records: Sequence[Record], out: Path) -> str:
         (`multiview/refine.py`), seen from the other side. RMS distance of true correspondences:
         {told}.""",
     )
-
-
-def _middle_time(views: Sequence[Any]) -> tuple[int, tuple[float, float]]:
-    import numpy as np
-
-    fields = [heat_field(view.scan) for view in views]
-    index = len(fields[0].times) // 2
-    low, high = np.percentile(np.concatenate([f.signature[:, index] for f in fields]), [8, 99])
-    return index, (float(low), float(high))
 
 
 def _rms(result: Mapping[str, Any], record: Record, name: str) -> str:

@@ -11,7 +11,7 @@ from benchmarks.paper.drawing.scene import Body, Look, look_at, render
 from benchmarks.paper.drawing.sheet import WIDTH, Sheet, draw_segments
 from benchmarks.paper.drawing.style import ACCENT, BACK_PLANE, CLAY, INK, SCANS, WALL
 from benchmarks.paper.figures.heat_field import heat_field
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from scanweld.geometry.prepared import PreparedScan
 
 _FROM_FRONT = (0.30, -0.12, -1.0)
@@ -22,6 +22,9 @@ _BALL = 0.0135
 _HEIGHT, _FOOT, _TOP = 430, 108, 18
 _GREEN = SCANS[3]
 
+Picture = tuple[ByteArray, FloatArray, str, str]
+"""A rendered picture, segments (N, 2, 2) drawn over it, what it is, and a quieter note."""
+
 
 def draw(rows: Sequence[tuple[PreparedScan, Mapping[str, Any]]], path: Path) -> None:
     """Draw a row for each scan and what was measured of it."""
@@ -31,15 +34,17 @@ def draw(rows: Sequence[tuple[PreparedScan, Mapping[str, Any]]], path: Path) -> 
     for row, (scan, result) in enumerate(rows):
         top = _TOP + row * (_HEIGHT + _FOOT)
         pictures = _pictures(scan, result, width - 24, _HEIGHT)
-        for column, (picture, text, note) in enumerate(pictures):
-            axes = sheet.place(picture[0], column * width + 12, top)
-            draw_segments(axes, picture[1], ACCENT, 2.6)
+        for column, (picture, shifts, text, note) in enumerate(pictures):
+            axes = sheet.place(picture, column * width + 12, top)
+            draw_segments(axes, shifts, ACCENT, 2.6)
             middle = (column + 0.5) * width
             sheet.caption(next(letters), text, middle, top + _HEIGHT + 32, note)
     sheet.save(path)
 
 
-def _pictures(scan: PreparedScan, result: Mapping[str, Any], width: int, height: int) -> list[Any]:
+def _pictures(
+    scan: PreparedScan, result: Mapping[str, Any], width: int, height: int
+) -> list[Picture]:
     field = heat_field(scan)
     before, after, grouped = (np.array(result[k]) for k in ("before", "after", "grouped"))
     look = look_at(scan.mesh.vertices, _FROM_FRONT, _UP, width, height)
@@ -54,22 +59,26 @@ def _pictures(scan: PreparedScan, result: Mapping[str, Any], width: int, height:
     ]
     return [
         (
-            (render([scan_body(scan, _GREEN)], look), none),
+            render([scan_body(scan, _GREEN)], look),
+            none,
             "range scan",
             f"{result['pixels']:,} pixels",
         ),
         (
-            (render([_artificial(scan)], behind), none),
+            render([_artificial(scan)], behind),
+            none,
             "artificial mesh",
             f"{result['front_faces']:,} + {result['other_faces']:,} faces",
         ),
         (
-            (render(marks, look), _shifts(look, before[shifted], after[shifted])),
+            render(marks, look),
+            _shifts(look, before[shifted], after[shifted]),
             "shifted to the front",
             f"{len(after)} maxima, {result['moved']} moved off the rim",
         ),
         (
-            (render([pale, balls(grouped, radius, INK)], look), none),
+            render([pale, balls(grouped, radius, INK)], look),
+            none,
             "grouped",
             f"{len(grouped)} keypoints",
         ),
@@ -85,7 +94,7 @@ def _artificial(scan: PreparedScan) -> Body:
     return wired_body(mesh.vertices, mesh.faces, colors)
 
 
-def _is_back(vertices: FloatArray, faces: Any, num_front: int) -> Any:
+def _is_back(vertices: FloatArray, faces: IntArray, num_front: int) -> BoolArray:
     """Faces (F,) that lie in a plane of constant depth behind the front."""
     depth = vertices[:, 2][faces]
     flat = np.ptp(depth, axis=1) < 1e-9 * np.ptp(vertices[:, 2])

@@ -88,13 +88,6 @@ class Sheet:
         axes = self.axes(left - 12, top - 12, 24, 24)
         axes.scatter([0], [0], s=_points(17) ** 2, color=[tuple(color)], linewidths=0)
 
-    def line(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Rule a thin line."""
-        axes = self.axes(0, 0, self.width, self.height)
-        axes.set_xlim(0, self.width)
-        axes.set_ylim(self.height, 0)
-        axes.plot(*zip(start, end, strict=True), color=(*QUIET, 0.35), lw=1.2)
-
     def save(self, path: Path) -> None:
         """Write a PNG of so many colours that the file stays small."""
         with rc_context({"font.family": "DejaVu Sans", "mathtext.fontset": "dejavusans"}):

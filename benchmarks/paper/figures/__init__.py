@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.paper.baselines.own import AS_PUBLISHED
-from benchmarks.paper.figures.heat_field import heat_field
+from benchmarks.paper.figures.heat_field import HeatField, heat_field
 from benchmarks.paper.figures.subjects import subject
 from benchmarks.paper.methods import METHODS, ScanPair
 from benchmarks.paper.optional import need
@@ -146,19 +146,20 @@ def _heat(unit: Unit) -> Result:
     views = [virtual_scan(unit["object"], azimuth) for azimuth in unit["azimuths_deg"]]
     fields = [heat_field(view.scan) for view in views]
     last = len(fields[0].times) - 1
-    rows = []
-    for name, place in TIMES.items():
-        index = round(place * last)
-        values = np.concatenate([field.signature[:, index] for field in fields])
-        rows.append(
-            {
-                "name": name,
-                "index": index,
-                "time": float(np.mean([field.times[index] for field in fields])),
-                "range": np.percentile(values, [8.0, 99.0]).tolist(),
-            }
-        )
+    rows = [
+        {"name": name, **_heat_at(fields, round(place * last))} for name, place in TIMES.items()
+    ]
     return {"times": rows, "keypoints": [len(field.grouped) for field in fields]}
+
+
+def _heat_at(fields: Sequence[HeatField], index: int) -> dict[str, Any]:
+    """One of the diffusion times, and the colours' range: all heat but the outermost percents."""
+    values = np.concatenate([field.signature[:, index] for field in fields])
+    return {
+        "index": index,
+        "time": float(np.mean([field.times[index] for field in fields])),
+        "range": np.percentile(values, [8.0, 99.0]).tolist(),
+    }
 
 
 def _pair(unit: Unit) -> Result:
@@ -189,6 +190,7 @@ def _four_views(unit: Unit) -> Result:
     setting = SETTINGS[unit["setting"]]
     views = scans_of(setting)
     scans = [view.scan for view in views]
+    fields = [heat_field(scan) for scan in scans]
     steps = {"start": {k: Pose.identity() for k in range(len(views))}}
     for name in ("paper-coarse", "default"):
         chain = _chained(views, name)
@@ -202,7 +204,8 @@ def _four_views(unit: Unit) -> Result:
     return {
         "azimuths_deg": azimuths_of(setting),
         "diameter": views[0].diameter,
-        "keypoints": [len(heat_field(scan).grouped) for scan in scans],
+        "keypoints": [len(field.grouped) for field in fields],
+        "heat": _heat_at(fields, len(fields[0].times) // 2),
         "steps": {name: _assembly(setting.edges, views, poses) for name, poses in steps.items()},
     }
 
