@@ -118,7 +118,7 @@ def _draw_coarse(records: Sequence[Record], out: Path) -> str:
         )
         for answer in record.result["answers"]
     ]
-    scene = Scene(name, views, WIDTH // len(panels), 430, _CUT_AT[name], (1.0, 1.0))
+    scene = Scene(name, views, WIDTH // len(panels), 450, _CUT_AT[name], (1.0, 1.0), 0.13)
     assemblies.draw_pair(scene, panels, out / "fig4-coarse.png", 220)
     told = "; ".join(f"{panel.text}: {panel.note}" for panel in panels)
     gap = azimuths[1] - azimuths[0]
