@@ -43,7 +43,8 @@ def measure(unit: Unit) -> Result:
     scans, edges, true = (i.scan, j.scan), [(0, 1)], i.from_other(j)
     start = {0: Pose.identity(), 1: disturbed(true, j.centre(), START_DEG, unit["azimuth"])}
     matcher = contour_matcher(scans, ContoursConfig())
-    found = {ALONE: mm_icc(scans, start, edges, ContoursConfig()).poses}
+    contours = ContoursConfig(residual="normal")
+    found = {ALONE: mm_icc(scans, start, edges, contours).poses}
     for told, weight in WEIGHTS.items():
         config = RefineConfig(contour_weight=weight)
         found[told] = refine_poses(scans, start, edges, config, matcher).poses
