@@ -110,7 +110,7 @@ COARSE_DEG, COARSE_PERCENT = 5.0, 2.0
 Tuning = Mapping[str, float | int | None]
 CENTRE: dict[str, Tuning] = {
     "m-icc": {"tau": 3.0, "renders": 40, "trim": None},
-    "mm-icc": {"tau": 5.0, "renders": 40, "trim": 0.9},
+    "mm-icc": {"tau": 10.0, "renders": 40, "trim": 0.9},
 }
 """What the sweep changes one thing of at a time: tau_1 = tau_2 in pixels, renderings, and the share
 of matches kept in space (found anew if None; M-ICC's mutual matches are not trimmed)."""
@@ -122,7 +122,7 @@ SWEEP: dict[str, tuple[Tuning, ...]] = {
     "mm-icc": tuple(
         {**CENTRE["mm-icc"], **change}
         for change in (
-            *({}, {"tau": 3.0}, {"tau": 10.0}, {"renders": 10}, {"renders": 20}),
+            *({}, {"tau": 3.0}, {"tau": 5.0}, {"renders": 10}, {"renders": 20}),
             *({"trim": 0.7}, {"trim": None}),
         )
     ),
