@@ -217,7 +217,7 @@ def test_outline_distance_ignores_sliding():
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(("gap", "degrees"), [(60, 0.0), (60, 20.0), (90, 20.0)])
-@pytest.mark.parametrize("residual", ["image", "normal"])
+@pytest.mark.parametrize("residual", ["point, image", "normal"])
 def test_mm_icc_keeps_and_finds_the_truth(
     model: CameraModel, gap: int, degrees: float, residual: str
 ):

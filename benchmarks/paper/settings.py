@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from benchmarks.paper.views import (
 )
 from scanweld.config import ContoursConfig
 from scanweld.contours.contour_sets import far_side
-from scanweld.contours.mm_icc import mm_icc
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import principal_diameter
 
@@ -100,8 +98,10 @@ TITLES: dict[str, str] = {
     "joint": "joint refinement",
     "default": "default",
 }
-START_DEG = (10, 20, 40)
-NUM_SEEDS = 8
+STARTS = ((10, 8), (20, 8), (40, 32))
+"""Angle of the starts in degrees, and how many: from near, nearly all runs converge."""
+NUM_SWEPT, FIRST_SWEPT = 8, 100
+"""Other starts, by number and first seed, by which the tuning is chosen."""
 SWEEP_DEG = 40
 """The tuning is chosen by the hardest starts: from the others nearly all runs converge."""
 COARSE_DEG, COARSE_PERCENT = 5.0, 2.0
@@ -179,32 +179,6 @@ def start_poses(scans: Sequence[VirtualScan], degrees: float, seed: int) -> dict
         for k in range(1, len(scans))
     }
     return true | turned
-
-
-def mm_icc_in_two_rounds(
-    scans: Sequence[PreparedScan],
-    start: Mapping[int, Pose],
-    edges: Sequence[tuple[int, int]],
-    tuning: Mapping[str, Any],
-) -> Mapping[int, Pose]:
-    """MM-ICC: trimmed ICP in space gets in from far; the distance in the image lies closer.
-
-    Args:
-        scans: All scans.
-        start: ``world_from_sensor`` at the start.
-        edges: Adjacent views.
-        tuning: As in ``SWEEP``; the second round gets a quarter of the renderings.
-    """
-    num_last = tuning["renders"] // 4
-    first = ContoursConfig(
-        jump_pixels=tuning["tau"],
-        num_renders=tuning["renders"] - num_last,
-        trim=tuning["trim"],
-        residual="point",
-    )
-    last = ContoursConfig(jump_pixels=tuning["tau"], num_renders=num_last, residual="image")
-    poses = mm_icc(scans, start, edges, first).poses
-    return mm_icc(scans, poses, edges, last).poses
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

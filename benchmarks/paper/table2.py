@@ -9,16 +9,16 @@ from typing import Any
 from benchmarks.paper.settings import (
     COARSE_DEG,
     COARSE_PERCENT,
-    NUM_SEEDS,
+    FIRST_SWEPT,
+    NUM_SWEPT,
     SETTINGS,
-    START_DEG,
+    STARTS,
     SWEEP,
     SWEEP_DEG,
     TITLES,
     TUNED,
     Setting,
     azimuths_of,
-    mm_icc_in_two_rounds,
     outcome,
     scans_of,
     start_poses,
@@ -30,6 +30,7 @@ from benchmarks.paper.views import VirtualScan, mesh_of, pose_error
 from scanweld.config import Config, ContoursConfig, FusionConfig
 from scanweld.contours.coherence import contour_matcher
 from scanweld.contours.m_icc import m_icc
+from scanweld.contours.mm_icc import mm_icc
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import describe
 from scanweld.multiview.refine import refine_poses
@@ -53,18 +54,21 @@ def units(quick: bool) -> list[Unit]:
     """
     if quick:
         methods = ("m-icc", "mm-icc", "joint", "default")
-        return [_final("quick", 0.0, method, seeds=1) for method in methods]
+        return [
+            _final("quick", 0.0, method, [(degrees, 1) for degrees, _ in STARTS])
+            for method in methods
+        ]
     numerals = [numeral for numeral in SETTINGS if numeral != "quick"]
     for numeral in numerals:
         mesh_of(SETTINGS[numeral].name)
     sweep = [
-        {"part": "sweep", "setting": numeral, "method": method, "seeds": NUM_SEEDS, **tuning}
+        {"part": "sweep", "setting": numeral, "method": method, "seeds": NUM_SWEPT, **tuning}
         for method, tunings in SWEEP.items()
         for tuning in tunings
         for numeral in numerals
     ]
     final = [
-        _final(numeral, noise, method, NUM_SEEDS)
+        _final(numeral, noise, method, STARTS)
         for noise in NOISES
         for method in TITLES
         for numeral in numerals
@@ -72,9 +76,9 @@ def units(quick: bool) -> list[Unit]:
     return [*sweep, *final]
 
 
-def _final(numeral: str, noise: float, method: str, seeds: int) -> Unit:
-    unit = {"part": "final", "setting": numeral, "noise": noise, "method": method, "seeds": seeds}
-    return {**unit, **TUNED.get(method, {})}
+def _final(numeral: str, noise: float, method: str, starts: Sequence[tuple[int, int]]) -> Unit:
+    unit = {"part": "final", "setting": numeral, "noise": noise, "method": method}
+    return {**unit, "starts": starts, **TUNED.get(method, {})}
 
 
 def measure(unit: Unit) -> dict[str, Any]:
@@ -83,9 +87,9 @@ def measure(unit: Unit) -> dict[str, Any]:
     if unit["method"] == "default":
         runs = _default_runs(setting, unit)
     elif unit["part"] == "sweep":
-        runs = [_run(setting, unit, SWEEP_DEG, seed) for seed in range(unit["seeds"])]
+        runs = [_run(setting, unit, SWEEP_DEG, FIRST_SWEPT + k) for k in range(unit["seeds"])]
     else:
-        starts = [(degrees, seed) for degrees in START_DEG for seed in range(unit["seeds"])]
+        starts = [(degrees, seed) for degrees, num in unit["starts"] for seed in range(num)]
         runs = [_run(setting, unit, *start) for start in starts]
         runs += _coarse_runs(setting, unit)
     return {
@@ -112,7 +116,8 @@ def _refined(
     if unit["method"] == "m-icc":
         config = ContoursConfig(jump_pixels=unit["tau"], num_renders=unit["renders"])
         return m_icc(prepared, start, setting.edges, config).poses
-    return mm_icc_in_two_rounds(prepared, start, setting.edges, unit)
+    config = ContoursConfig(jump_pixels=unit["tau"], num_renders=unit["renders"], trim=unit["trim"])
+    return mm_icc(prepared, start, setting.edges, config).poses
 
 
 def _coarse_runs(setting: Setting, unit: Unit) -> list[dict[str, Any]]:

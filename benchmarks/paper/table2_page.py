@@ -12,7 +12,7 @@ from benchmarks.paper.settings import (
     CONVERGED_DEG,
     CONVERGED_PERCENT,
     SETTINGS,
-    START_DEG,
+    STARTS,
     SWEEP,
     SWEEP_DEG,
     TITLES,
@@ -91,12 +91,12 @@ def _settings_table(numerals: Sequence[str], at: Mapping[tuple[str, str], Record
 
 
 def _starts_table(final: Sequence[Record]) -> str:
-    starts = [*START_DEG, "coarse"]
+    starts = [*(degrees for degrees, _ in STARTS), "coarse"]
     rows = [
         [TITLES[method], *(_share(_from(final, method, start)) for start in starts)]
         for method in ("m-icc", "mm-icc", "joint")
     ]
-    headings = ["converged", *(f"{start}° off" for start in START_DEG), "published coarse pose"]
+    headings = ["converged", *(f"{start}° off" for start, _ in STARTS), "published coarse pose"]
     return (
         "All settings, noise-free and not. The published coarse pose counts where it is right "
         f"(< {COARSE_DEG:g}°, < {COARSE_PERCENT:g} %) for every view of a setting.\n\n"

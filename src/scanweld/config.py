@@ -164,16 +164,16 @@ class ContoursConfig(Section):
     matching: Literal["trimmed", "mutual"] = "trimmed"
     """Closest observed points, the farthest left out (MM-ICC), or only pairs of points that are
     closest to each other (M-ICC)."""
-    trim: float | None = Field(default=0.7, gt=0, le=1)
+    trim: float | None = Field(default=0.9, gt=0, le=1)
     """Share of the contour matches that trimmed ICP keeps; found anew in each step if None."""
-    num_renders: int = Field(default=20, ge=1)
-    """Outer iterations: predicted range images are rendered anew in each."""
+    num_renders: int = Field(default=40, ge=1)
+    """Outer iterations, at most: predicted range images are rendered anew in each."""
     num_steps: int = Field(default=3, ge=1)
     """Inner iterations between two renderings."""
-    residual: Literal["image", "point", "normal"] = "image"
-    """What is minimised of the contours matched in 3D: their distance in the image, which is
-    M-ICC's and which the paper does not change; that in 3D, as in ICP; or, ours, that in the image
-    and then across the outline alone."""
+    residual: Literal["point", "image", "point, image", "normal"] = "point, image"
+    """What is minimised of the contours matched: their distance in space, as in trimmed ICP, which
+    gets in from afar; their distance in the image, which is M-ICC's and lies closer; the one after
+    the other; or, ours, both and then the distance across the outline alone."""
 
 
 class RefineConfig(Section):

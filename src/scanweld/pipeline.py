@@ -28,6 +28,10 @@ from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
 from scanweld.steps import describe_scans, fuse_largest, lay_out, pair_judge
 
+MAX_POLISHES = 3
+"""Refinements of a pair's pose, one after the other: where overlap is thin, one does not arrive."""
+STILL_DEG, STILL_DIAMETERS = 0.5, 0.005
+"""A refinement that turns and shifts a pose by less has arrived."""
 NUM_SETTLING_ROUNDS = 3
 """Rounds of refinement of a component that grows, so that chains of pairs do not drift."""
 
@@ -139,9 +143,14 @@ def pair_registrar(
         i, j = edge
 
         def polish(i_from_j: Pose) -> Pose:
-            start = {i: Pose.identity(), j: i_from_j}
-            refined = refine_poses(prepared, start, [edge], config.refine, contours).poses
-            return refined[i].inverse() @ refined[j]
+            for _ in range(MAX_POLISHES):
+                start = {i: Pose.identity(), j: i_from_j}
+                i_from_j = refine_poses(prepared, start, [edge], config.refine, contours).poses[j]
+                moved = start[j].inverse() @ i_from_j
+                shift = moved.shift_at(fields[j].centre) / diameter
+                if moved.angle_deg() < STILL_DEG and shift < STILL_DIAMETERS:
+                    break
+            return i_from_j
 
         both = list(zip(anchors[i], anchors[j], strict=True))
         return register_pair(i, j, fields[i], fields[j], both, diameter, config.pairs, polish)

@@ -23,7 +23,7 @@ Align = Callable[
     [Sequence[PreparedScan], Mapping[int, Pose], Edges, ContoursConfig], ContourAlignment
 ]
 
-AS_PUBLISHED = ContoursConfig(residual="point")
+AS_PUBLISHED = ContoursConfig()
 
 
 def icp(pair: ScanPair, start: Pose, seed: int) -> Answer:

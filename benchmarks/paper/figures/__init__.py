@@ -13,9 +13,8 @@ from benchmarks.paper.figures.heat_field import HeatField, heat_field
 from benchmarks.paper.figures.subjects import subject
 from benchmarks.paper.methods import METHODS, ScanPair
 from benchmarks.paper.optional import need
-from benchmarks.paper.settings import SETTINGS, azimuths_of, outcome, scans_of, start_poses
+from benchmarks.paper.settings import SETTINGS, TUNED, azimuths_of, outcome, scans_of, start_poses
 from benchmarks.paper.study import Record, Result, Unit
-from benchmarks.paper.table2 import NUM_SEEDS, TUNED
 from benchmarks.paper.views import VirtualScan, overlap_of, pose_error, virtual_scan
 from scanweld.config import Config, ContoursConfig
 from scanweld.contours.coherence import ContourPair, coherence, contour_matcher
@@ -35,6 +34,7 @@ NAME = "figures"
 TITLE = "Figures 1 to 6: what happens on the way"
 
 GALLERY_START_DEG = (20, 40)
+GALLERY_SEEDS = 8
 TIMES = {"short": 0.0, "middle": 0.5, "long": 1.0}
 """Places among the diffusion times, from the shortest to the longest."""
 PAIR_METHODS = ("m-icc", "paper-coarse", "default")
@@ -58,7 +58,7 @@ def units(quick: bool) -> list[Unit]:
         {"figure": "four views", "setting": "vii"},
         {"figure": "heat", "object": "armadillo", "azimuths_deg": [120.0, 160.0, 200.0, 240.0]},
         *(
-            _gallery_unit(numeral, degrees, NUM_SEEDS)
+            _gallery_unit(numeral, degrees, GALLERY_SEEDS)
             for degrees in GALLERY_START_DEG
             for numeral in SETTINGS
             if numeral != "quick"

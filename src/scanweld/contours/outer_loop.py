@@ -35,6 +35,10 @@ OUTLINE_NOISE_PIXELS = 0.3
 """Standard deviation of an outline that is known to the pixel."""
 STILL_PIXELS = 0.05
 """The iteration has come to rest when a rendering moves no scan by more."""
+LAST_PHASE = 4
+"""One in so many renderings is left for the distance in the image, where that in space is first,"""
+LAST_TRIM = 0.7
+"""and so large a share of the matches: near the end what does not match is told more easily."""
 NUM_PROBES = 100
 """Vertices of a scan whose movement is looked at."""
 
@@ -85,22 +89,48 @@ def align_contours(
         k: observe_contours(scans[k], config) for k in sorted({k for e in edges for k in e})
     }
     current, converged = dict(sorted(poses.items())), False
-    for _ in range(config.num_renders):
-        links = _holding(render_links(observed, current, edges, config))
-        moved = _inner_loop(links, current, _held(links, current), config, _arm(observed))
-        converged = bool(links) and _largest_move(observed, current, moved) < STILL_PIXELS
-        current = moved
-        if converged or not links:
-            break
+    for phase in _phases(config):
+        current, converged = _until_still(observed, current, edges, phase)
     if config.residual == "normal":
         current = _outline_rounds(observed, current, edges, config)
-    return _judged(observed, current, edges, converged, config)
+    return _judged(observed, current, edges, converged, _phases(config)[-1])
 
 
 def _check(edges: Sequence[tuple[int, int]], poses: Mapping[int, Pose]) -> None:
     for i, j in edges:
         if i == j or i not in poses or j not in poses:
             raise ValueError(f"the edge {(i, j)} needs two scans that both have a pose")
+
+
+def _phases(config: ContoursConfig) -> list[ContoursConfig]:
+    """What is minimised one after the other, and in how many renderings."""
+    if config.residual in ("point", "image"):
+        return [config]
+    num_last = max(1, config.num_renders // LAST_PHASE)
+    num_first = max(1, config.num_renders - num_last)
+    return [
+        config.model_copy(update={"residual": "point", "num_renders": num_first}),
+        config.model_copy(update={"residual": "image", "num_renders": num_last, "trim": LAST_TRIM}),
+    ]
+
+
+def _until_still(
+    observed: Mapping[int, ObservedContours],
+    poses: dict[int, Pose],
+    edges: Sequence[tuple[int, int]],
+    config: ContoursConfig,
+) -> tuple[dict[int, Pose], bool]:
+    """The outer loop; with the poses comes whether it came to rest before its last rendering."""
+    for _ in range(config.num_renders):
+        links = _holding(render_links(observed, poses, edges, config))
+        if not links:
+            break
+        moved = _inner_loop(links, poses, _held(links, poses), config, _arm(observed))
+        step = _largest_move(observed, poses, moved)
+        poses = moved
+        if step < STILL_PIXELS:
+            return poses, True
+    return poses, False
 
 
 def _inner_loop(
