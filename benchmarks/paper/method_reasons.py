@@ -151,7 +151,7 @@ REASONS: dict[str, Reason] = {
     "terms-start": lambda _: f"{terms.START_DEG:g}",
     **{
         f"{name}-error": partial(_contour_error, variant=_CONTOURS[name])
-        for name in ("image", "point", "outline")
+        for name in ("published", "image", "point", "outline")
     },
     "apart-none": partial(_apart, prunings="none"),
     "apart-12": partial(_apart, prunings="1 and 2"),

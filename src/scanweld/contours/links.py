@@ -12,14 +12,11 @@ from scanweld.contours.coherence import ContourPair, contour_pair
 from scanweld.contours.contour_sets import ObservedContours
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera
+from scanweld.geometry.point_fit import num_trusted
 from scanweld.geometry.pose import Pose
 
 MIN_MATCHES = 12
 """Fewer contour points than this say nothing about a pose."""
-FRACTION_EXPONENT = 1.3
-"""How much a larger share of matches is worth, against a smaller rms."""
-MIN_SHARE = 0.3
-"""Smallest share of the matches that is kept."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,8 +104,7 @@ def match_trimmed(link: ContourLink, j_from_i: Pose, share: float | None) -> Lin
     distances, nearest = link.observed_tree.query(j_from_i.apply(link.points))
     order = np.argsort(distances, kind="stable")
     squares = distances[order] ** 2
-    num = _best_count(squares) if share is None else int(np.ceil(share * len(order)))
-    kept = order[:num]
+    kept = order[: num_trusted(squares, "auto" if share is None else share)]
     return LinkMatches(link=link, points=link.points[kept], observed=np.asarray(nearest)[kept])
 
 
@@ -118,12 +114,3 @@ def match_mutual(link: ContourLink, j_from_i: Pose) -> LinkMatches:
     _, back = link.predicted_tree.query(j_from_i.inverse().apply(link.pair.observed.points))
     kept = np.flatnonzero(np.asarray(back)[forth] == np.arange(len(link.points)))
     return LinkMatches(link=link, points=link.points[kept], observed=np.asarray(forth)[kept])
-
-
-def _best_count(squares: FloatArray) -> int:
-    """How many of the smallest squares to keep: least rms / share^lambda (Phillips et al. 2007)."""
-    counts = np.arange(1, len(squares) + 1)
-    shares = counts / len(squares)
-    fractional = np.sqrt(np.cumsum(squares) / counts) / shares**FRACTION_EXPONENT
-    least = int(np.ceil(MIN_SHARE * len(squares)))
-    return least + int(np.argmin(fractional[least - 1 :]))

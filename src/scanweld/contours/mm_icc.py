@@ -16,13 +16,12 @@ def mm_icc(
 ) -> ContourAlignment:
     """Refine the poses of two or more views by MM-ICC.
 
-    As published by default: three prunings and trimmed matches in 3D, over all adjacent views
-    together. What is minimised the paper does not say; as MM-ICC changes the prunings and the
-    matching of M-ICC and nothing else, it is taken to be M-ICC's distance in the image. The
-    distance in 3D (residual ``"point"``) is the other reading: contour points slide along the
-    surface, and their depth on an outline is nearly undetermined, so that it gets in from less far
-    and comes to rest half a pixel or more off. All other settings are readings of the paper too,
-    or leave parts of it out; ``"normal"`` is ours.
+    Three prunings, and matches in 3D that are trimmed as in trimmed ICP, all adjacent views solved
+    for together. What is minimised the paper does not say. The distance in space is what trimmed
+    ICP takes: it gets in from far, and comes to rest half a pixel or more off, as contour points
+    slide along the surface. The distance in the image is M-ICC's, of which MM-ICC changes only the
+    prunings and the matching: it lies closer. By default the one comes after the other. All other
+    settings are readings of the paper too, or leave parts of it out; ``"normal"`` is ours.
 
     Args:
         scans: All scans.
