@@ -147,7 +147,7 @@ def _floors(records: Sequence[Record]) -> str:
             num_right = len(tried) - len(wrong)
             verdict = "pass" if num_right >= floor * len(tried) else "**FAIL**"
             rows.append((asked, str(limit), f"{num_right}/{len(tried)}", percent(floor), verdict))
-            missed += wrong
+            missed += [r for r in wrong if r not in missed]
     table = markdown_table(("default", "error", "pairs", "floor", ""), rows)
     return table + _those_missed(missed)
 
@@ -160,7 +160,12 @@ def _asked(records: Sequence[Record]) -> Iterator[tuple[str, Sequence[Record], L
             near = up_to(of(chosen, object=name, protocol=protocol), NEAR_GAP)
             where = f"{name}, {PROTOCOL_TITLES[protocol]}, to {NEAR_GAP}°, {noise_title(noise)}"
             yield where, near, RIGHT, 1.0
-        far = beyond(of(chosen, protocol="random"), NEAR_GAP)
+        all_of_them = of(chosen, protocol="random")
+        for low, _, floor in OVERLAPS:
+            if floor is not None:
+                where = f"any start, any gap, overlap from {low:.2f}, {noise_title(noise)}"
+                yield where, overlapping(all_of_them, low, 1.01), SUCCESS, floor
+        far = beyond(all_of_them, NEAR_GAP)
         for low, high, floor in OVERLAPS:
             if floor is not None:
                 where = f"any start, beyond {NEAR_GAP}°, overlap {overlap_title(low, high)}"
