@@ -69,7 +69,7 @@ def page(records: Sequence[Record]) -> str:
         "## Readings of the published coarse step\n\n"
         "The paper names no threshold for eq. 1, and leaves open on what the ICP runs. Taken are "
         "all nearest signatures, a fit to them, and ICP of the surfaces, untrimmed; the other rows "
-        "change one of these. The last two are ours: they say what would have to change. "
+        "change one of these. The last two are ours: a better start, before the same ICP. "
         f"Cells: coarse poses that are right ({RIGHT} of the diameter) of all, and the median "
         "error of these in degrees.\n\n"
         + markdown_table(["reading", *(f"{gap}° apart" for gap in gaps), "all"], rows)
