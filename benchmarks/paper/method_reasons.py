@@ -132,6 +132,8 @@ _COARSE = {
     "trimmed": "trimmed ICP",
     "consensus": "ours: start where the nearest signatures agree",
     "evidence": "ours: start where the evidence is best",
+    "consensus-trimmed": "the former, trimmed ICP",
+    "evidence-trimmed": "the latter, trimmed ICP",
 }
 _TERMS = {"contours": terms.ALONE, "surfaces": "surfaces alone", "both": "both"}
 _KINDS = {"agree": ("agree",), "violated": ("front", "contradict", "free")}

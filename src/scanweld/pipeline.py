@@ -11,10 +11,8 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import Features
 from scanweld.intake import Intake, take_in
-from scanweld.multiview.assemble import build_view_graph
-from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.refine import ContourMatcher, refine_poses, scan_rms
-from scanweld.multiview.refine_graph import Refined, refine_graph
+from scanweld.multiview.refine_graph import Refined
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.outcome import conclude
 from scanweld.pairs.anchors import pair_anchors
@@ -26,7 +24,13 @@ from scanweld.progress import Cache, NoCache, Progress, silent
 from scanweld.published import reconstruct_as_published
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
-from scanweld.steps import describe_scans, fuse_largest, lay_out, pair_judge
+from scanweld.steps import (
+    describe_scans,
+    fuse_largest,
+    lay_out,
+    place_scans,
+    refine_placed,
+)
 
 MAX_POLISHES = 3
 """Refinements of a pair's pose, one after the other: where overlap is thin, one does not arrive."""
@@ -171,19 +175,7 @@ def _build_graph(
     def settle(poses: Mapping[int, Pose]) -> Mapping[int, Pose]:
         return refine_poses(intake.prepared, poses, [], settling).poses
 
-    with stages.stage("graph") as counts:
-        graph = build_view_graph(
-            len(fields),
-            pairs,
-            [field.centre for field in fields],
-            intake.diameter,
-            pair_judge(fields, intake.diameter, config),
-            settle,
-            config.graph,
-        )
-        counts["accepted"] = len(graph.accepted)
-        counts["components"] = len(graph.components)
-    return graph
+    return place_scans(intake, fields, pairs, settle, config, stages)
 
 
 def _refine(
@@ -194,16 +186,10 @@ def _refine(
     config: Config,
     stages: Stages,
 ) -> ViewGraph:
-    """Refine each component's poses together (paper 3.2), and doubt what comes out."""
-    judge_pair = pair_judge(fields, intake.diameter, config)
+    """Refine surfaces and contours together (paper 3.2), and doubt what comes out."""
 
     def refine(poses: Mapping[int, Pose], edges: Sequence[Edge]) -> Refined:
         refined = refine_poses(intake.prepared, poses, edges, config.refine, contours)
         return refined.poses, scan_rms(refined)
 
-    with stages.stage("refine") as counts:
-        graph = refine_graph(graph, refine, judge_pair)
-        graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
-        counts["scans"] = sum(len(component.poses) for component in graph.components)
-        counts["doubtful"] = len(graph.doubts)
-    return graph
+    return refine_placed(intake, fields, graph, refine, config, stages)

@@ -15,9 +15,7 @@ from scanweld.contours.mm_icc import mm_icc
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features
 from scanweld.intake import Intake
-from scanweld.multiview.assemble import build_view_graph
-from scanweld.multiview.explain import find_doubts
-from scanweld.multiview.refine_graph import Refined, refine_graph
+from scanweld.multiview.refine_graph import Refined
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.outcome import conclude
 from scanweld.pairs.coarse import register_as_published
@@ -27,7 +25,13 @@ from scanweld.pairs.rivals import judge_pose
 from scanweld.pairs.verdict import no_pose
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
-from scanweld.steps import describe_scans, fuse_largest, lay_out, pair_judge
+from scanweld.steps import (
+    describe_scans,
+    fuse_largest,
+    lay_out,
+    place_scans,
+    refine_placed,
+)
 
 
 def reconstruct_as_published(intake: Intake, config: Config, stages: Stages) -> Reconstruction:
@@ -96,19 +100,7 @@ def _choose_adjacent_views(
     This choice is ours: the paper is given its adjacent views. Unlike the robust method's graph
     nothing is refined on the way.
     """
-    with stages.stage("graph") as counts:
-        graph = build_view_graph(
-            len(fields),
-            pairs,
-            [field.centre for field in fields],
-            intake.diameter,
-            pair_judge(fields, intake.diameter, config),
-            lambda poses: poses,
-            config.graph,
-        )
-        counts["accepted"] = len(graph.accepted)
-        counts["components"] = len(graph.components)
-    return graph
+    return place_scans(intake, fields, pairs, lambda poses: poses, config, stages)
 
 
 def _refine(
@@ -119,15 +111,9 @@ def _refine(
     stages: Stages,
 ) -> ViewGraph:
     """MM-ICC over the adjacent views of each component (3.2), and doubts of what comes out."""
-    judge_pair = pair_judge(fields, intake.diameter, config)
 
     def refine(poses: Mapping[int, Pose], edges: Sequence[Edge]) -> Refined:
         aligned = mm_icc(intake.prepared, poses, edges, config.contours)
         return {**poses, **aligned.poses}, {}
 
-    with stages.stage("refine") as counts:
-        graph = refine_graph(graph, refine, judge_pair)
-        graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
-        counts["scans"] = sum(len(component.poses) for component in graph.components)
-        counts["doubtful"] = len(graph.doubts)
-    return graph
+    return refine_placed(intake, fields, graph, refine, config, stages)

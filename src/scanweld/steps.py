@@ -1,7 +1,8 @@
 """Steps that both methods take, each a stage of the run."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from scanweld.config import Config
 from scanweld.errors import InputError
@@ -10,10 +11,13 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features, describe
 from scanweld.intake import Intake
+from scanweld.multiview.assemble import Settle, build_view_graph
+from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Judge
-from scanweld.multiview.view_graph import ViewGraph
+from scanweld.multiview.refine_graph import Refine, refine_graph
+from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
-from scanweld.pairs.result import Evidence
+from scanweld.pairs.result import Evidence, PairResult
 from scanweld.pairs.visibility import judge, mean_evidence
 from scanweld.stages import Stages, work_key
 
@@ -54,6 +58,66 @@ def pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> 
         return mean_evidence(*both)
 
     return judge_pair
+
+
+def place_scans(
+    intake: Intake,
+    fields: Sequence[ScanField],
+    pairs: Mapping[Edge, PairResult],
+    settle: Settle,
+    config: Config,
+    stages: Stages,
+) -> ViewGraph:
+    """Place what the pairs can place together without contradiction.
+
+    Args:
+        intake: The scans, prepared.
+        fields: The scans laid out.
+        pairs: Every pair, judged.
+        settle: Refines the poses of a component as it grows.
+        config: Settings.
+        stages: Bookkeeping of the run.
+    """
+    with stages.stage("graph") as counts:
+        graph = build_view_graph(
+            len(fields),
+            pairs,
+            [field.centre for field in fields],
+            intake.diameter,
+            pair_judge(fields, intake.diameter, config),
+            settle,
+            config.graph,
+        )
+        counts["accepted"] = len(graph.accepted)
+        counts["components"] = len(graph.components)
+    return graph
+
+
+def refine_placed(
+    intake: Intake,
+    fields: Sequence[ScanField],
+    graph: ViewGraph,
+    refine: Refine,
+    config: Config,
+    stages: Stages,
+) -> ViewGraph:
+    """Refine each component's poses together (paper 3.2), and doubt what comes out.
+
+    Args:
+        intake: The scans, prepared.
+        fields: The scans laid out.
+        graph: Components with the poses that the pairs gave them.
+        refine: The joint refinement of a component.
+        config: Settings.
+        stages: Bookkeeping of the run.
+    """
+    judge_pair = pair_judge(fields, intake.diameter, config)
+    with stages.stage("refine") as counts:
+        graph = refine_graph(graph, refine, judge_pair)
+        graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
+        counts["scans"] = sum(len(component.poses) for component in graph.components)
+        counts["doubtful"] = len(graph.doubts)
+    return graph
 
 
 def fuse_largest(
