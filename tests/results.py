@@ -9,6 +9,7 @@ from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
+from scanweld.knowledge import Knowledge
 from scanweld.pairs.result import Evidence, PairKind
 from scanweld.progress import Cache, NoCache, Progress, silent
 from scanweld.reconstruction import (
@@ -101,6 +102,7 @@ def stub_run(
     scans: Sequence[RangeScan],
     config: Config | None = None,
     *,
+    knowledge: Knowledge | None = None,
     unreadable: Mapping[str, str] | None = None,
     workers: int | None = None,
     cache: Cache | None = None,
@@ -109,6 +111,7 @@ def stub_run(
     """Stands for the pipeline: places every scan that could be read, keeps one thing on the way."""
     if len(scans) < 2:
         raise InputError(f"only {len(scans)} of the scans can be read; give two or more")
+    (knowledge or Knowledge()).check_names([scan.name for scan in scans])
     for done, scan in enumerate(scans):
         progress("prepare", done + 1, len(scans))
         (cache or NoCache()).put(scan.content_hash(), scan.name)

@@ -5,7 +5,14 @@ In short: ``scanweld.run(scanweld.read_scans("scans/"))``.
 
 from scanweld import kernels as kernels  # first: makes room for the kernels of the others
 from scanweld.config import Config, load_config
-from scanweld.errors import ConfigError, InputError, ReadError, ScanweldError, WriteError
+from scanweld.errors import (
+    ConfigError,
+    InputError,
+    KnowledgeError,
+    ReadError,
+    ScanweldError,
+    WriteError,
+)
 from scanweld.evaluation.metrics import evaluate_poses
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -21,9 +28,12 @@ from scanweld.io import (
     write_scan_ply,
 )
 from scanweld.io.scans import read_scans
+from scanweld.knowledge import Knowledge, read_knowledge
 from scanweld.pairs.result import Evidence, PairKind
 from scanweld.pipeline import run
 from scanweld.reconstruction import (
+    FactReport,
+    FactVerdict,
     PairReport,
     Reconstruction,
     ScanReport,
@@ -37,7 +47,11 @@ __all__ = [
     "Config",
     "ConfigError",
     "Evidence",
+    "FactReport",
+    "FactVerdict",
     "InputError",
+    "Knowledge",
+    "KnowledgeError",
     "PairKind",
     "PairReport",
     "Pose",
@@ -54,6 +68,7 @@ __all__ = [
     "WriteError",
     "evaluate_poses",
     "load_config",
+    "read_knowledge",
     "read_mesh",
     "read_poses",
     "read_scan",

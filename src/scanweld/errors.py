@@ -17,5 +17,9 @@ class ConfigError(ScanweldError):
     """A setting that is unknown or out of its range."""
 
 
+class KnowledgeError(ScanweldError):
+    """Something given beforehand that cannot be meant: about no scan, or against itself."""
+
+
 class InputError(ScanweldError):
     """Too little, or nothing, to work on."""

@@ -1,4 +1,4 @@
-"""What comes in: scans prepared, sorted by content, and those that cannot take part named."""
+"""What comes in: scans prepared, sorted by content, those that cannot take part, what is known."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -10,6 +10,8 @@ from scanweld.config import Config
 from scanweld.errors import InputError
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.knowledge import Knowledge
+from scanweld.multiview.given import Given
 from scanweld.prepare import prepare
 from scanweld.stages import Stages
 
@@ -36,25 +38,35 @@ class Intake:
         diameter: Median diameter of these.
         refused: Reason for each of the others, by name.
         scans: All that could be read, by name.
+        knowledge: What users know beforehand, by name.
+        given: The same of those that take part, by index.
     """
 
     prepared: tuple[PreparedScan, ...]
     diameter: float
     refused: Mapping[str, str]
     scans: Mapping[str, RangeScan]
+    knowledge: Knowledge
+    given: Given
 
 
 def take_in(
-    scans: Sequence[RangeScan], unreadable: Mapping[str, str], config: Config, stages: Stages
+    scans: Sequence[RangeScan],
+    unreadable: Mapping[str, str],
+    knowledge: Knowledge,
+    config: Config,
+    stages: Stages,
 ) -> Intake:
     """Prepare all scans; leave out duplicates, scans of another size and what shows no surface.
 
     Raises:
         InputError: If fewer than two scans are left, or two have the same name.
+        KnowledgeError: If what is known is about scans that are not there.
     """
     names = [scan.name for scan in scans]
     if len(set(names)) < len(names):
         raise InputError("two scans have the same name; names must be unique")
+    knowledge.check_names({*names, *unreadable})
     refused = dict(unreadable)
     with stages.stage("prepare") as counts:
         kept = _without_duplicates(scans, refused)
@@ -80,6 +92,8 @@ def take_in(
         diameter=float(np.median([scan.diameter for scan in prepared])),
         refused=refused,
         scans={scan.name: scan for scan in scans},
+        knowledge=knowledge,
+        given=knowledge.by_index(prepared),
     )
 
 

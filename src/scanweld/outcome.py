@@ -16,6 +16,8 @@ from scanweld.pairs.result import Alternative, Evidence, PairResult
 from scanweld.pairs.visibility import judge
 from scanweld.reconstruction import (
     AlternativeReport,
+    FactReport,
+    FactVerdict,
     PairReport,
     Reconstruction,
     ScanReport,
@@ -31,6 +33,7 @@ def conclude(
     fields: Sequence[ScanField],
     graph: ViewGraph,
     mesh: TriangleMesh | None,
+    facts: tuple[FactReport, ...],
     config: Config,
     stages: Mapping[str, StageReport],
 ) -> Reconstruction:
@@ -46,7 +49,7 @@ def conclude(
         scans[scan.name] = _scan_report(
             k, intake, fields, graph, 0 if found is None else len(found.points), config
         )
-    verdict, reasons = _verdict(graph, scans, mesh)
+    verdict, reasons = _verdict(graph, scans, mesh, facts)
     return Reconstruction(
         poses=_poses(prepared, graph),
         components=tuple(
@@ -66,6 +69,7 @@ def conclude(
         reasons=reasons,
         stages=stages,
         config=config,
+        knowledge=facts,
     )
 
 
@@ -74,15 +78,19 @@ def _others(poses: Mapping[int, Pose], reference: int) -> list[int]:
 
 
 def _poses(prepared: Sequence[PreparedScan], graph: ViewGraph) -> dict[str, Pose]:
-    """world_from_scan: the world of a component is its reference's scan frame."""
+    """world_from_scan: the world is the scan frame of the reference, unless that is fixed."""
     poses = {}
     for component in graph.components:
-        world_from_reference = prepared[component.reference].scan_from_sensor
+        world_from_reference = component.world_from_reference(
+            prepared[component.reference].scan_from_sensor
+        )
         for k, pose in sorted(component.poses.items()):
             sensor_from_scan = prepared[k].scan_from_sensor.inverse()
             is_reference = k == component.reference
             poses[prepared[k].name] = (
-                Pose.identity() if is_reference else world_from_reference @ pose @ sensor_from_scan
+                component.world_from_scan or Pose.identity()
+                if is_reference
+                else world_from_reference @ pose @ sensor_from_scan
             )
     return dict(sorted(poses.items()))
 
@@ -180,7 +188,7 @@ def _pair_report(
         j=second.name,
         kind=result.kind,
         accepted=edge in graph.accepted,
-        reason=graph.rejected.get(edge, _remark(result, chosen)),
+        reason=graph.rejected.get(edge) or graph.remarks.get(edge) or _remark(result, chosen),
         i_from_j=None if chosen is None else between_scans(chosen.i_from_j),
         score=None if chosen is None else chosen.score,
         overlap=0.0 if chosen is None else _overlap_share(chosen.evidence),
@@ -206,10 +214,18 @@ def _overlap_share(evidence: Evidence) -> float:
 
 
 def _verdict(
-    graph: ViewGraph, scans: Mapping[str, ScanReport], mesh: TriangleMesh | None
+    graph: ViewGraph,
+    scans: Mapping[str, ScanReport],
+    mesh: TriangleMesh | None,
+    facts: Sequence[FactReport],
 ) -> tuple[Verdict, tuple[str, ...]]:
+    denied = [
+        f"the scans contradict what is given ({fact.fact}): {fact.reason}"
+        for fact in facts
+        if fact.verdict is FactVerdict.CONTRADICTED
+    ]
     if not graph.components:
-        return Verdict.NOTHING, ("no two scans could be registered to each other",)
+        return Verdict.NOTHING, ("no two scans could be registered to each other", *denied)
     by_verdict = {
         kind: [name for name, scan in sorted(scans.items()) if scan.verdict is kind]
         for kind in ScanVerdict
@@ -224,6 +240,7 @@ def _verdict(
         reasons.append(f"the scans fall into {len(graph.components)} components of {sizes} scans")
     if mesh is None:
         reasons.append("the placed scans could not be fused into a model")
-    if by_verdict[ScanVerdict.DOUBTFUL]:
+    reasons += denied
+    if by_verdict[ScanVerdict.DOUBTFUL] or denied:
         return Verdict.DOUBTFUL, tuple(reasons)
     return (Verdict.PARTIAL if reasons else Verdict.GOOD), tuple(reasons)

@@ -11,6 +11,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import Features
 from scanweld.intake import Intake, take_in
+from scanweld.knowledge import Knowledge
 from scanweld.multiview.refine import ContourMatcher, refine_poses, scan_rms
 from scanweld.multiview.refine_graph import Refined
 from scanweld.multiview.view_graph import Edge, ViewGraph
@@ -25,6 +26,7 @@ from scanweld.published import reconstruct_as_published
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
 from scanweld.steps import (
+    check_knowledge,
     describe_scans,
     fuse_largest,
     lay_out,
@@ -44,6 +46,7 @@ def run(
     scans: Sequence[RangeScan],
     config: Config | None = None,
     *,
+    knowledge: Knowledge | None = None,
     unreadable: Mapping[str, str] | None = None,
     workers: int | None = None,
     cache: Cache | None = None,
@@ -54,6 +57,7 @@ def run(
     Args:
         scans: Scans of one rigid object in arbitrary frames, in any order, names unique.
         config: Settings of every stage; the defaults if not given.
+        knowledge: What is known beforehand; each fact is checked and reported.
         unreadable: Name -> reason of scans that could not even be read, for the report.
         workers: Threads over scans and pairs; as many as there are cores if not given.
         cache: Keeps finished work, so that an interrupted run goes on where it stopped.
@@ -65,11 +69,12 @@ def run(
 
     Raises:
         InputError: If fewer than two scans are usable.
+        KnowledgeError: If what is known is about scans that are not there.
     """
     config = config or Config()
     stages = Stages(workers=num_workers(workers), cache=cache or NoCache(), progress=progress)
     with single_threaded_algebra():
-        intake = take_in(scans, unreadable or {}, config, stages)
+        intake = take_in(scans, unreadable or {}, knowledge or Knowledge(), config, stages)
         if config.method == "paper":
             return reconstruct_as_published(intake, config, stages)
         return _reconstruct(intake, config, stages)
@@ -84,7 +89,8 @@ def _reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructi
     graph = _build_graph(intake, fields, pairs, config, stages)
     graph = _refine(intake, fields, contours, graph, config, stages)
     mesh = fuse_largest(intake, graph, config, stages)
-    return conclude(intake, features, fields, graph, mesh, config, stages.reports)
+    facts = check_knowledge(intake, fields, graph, config)
+    return conclude(intake, features, fields, graph, mesh, facts, config, stages.reports)
 
 
 def _describe(intake: Intake, config: Config, stages: Stages) -> Sequence[Features | None]:
@@ -104,12 +110,15 @@ def _register_pairs(
 ) -> dict[Edge, PairResult]:
     """Register every pair of scans from any start pose, and judge what two scans alone say."""
     edges = list(combinations(range(len(fields)), 2))
-    register = pair_registrar(intake.prepared, features, fields, contours, intake.diameter, config)
+    register = pair_registrar(
+        intake.prepared, features, fields, contours, intake.diameter, config, intake.given.starts
+    )
 
     def key(edge: Edge) -> str:
         hashes = [intake.prepared[k].content_hash for k in edge]
         settings = (config.prepare, config.heat, config.pairs, config.contours, config.refine)
-        return work_key("pair", *hashes, intake.diameter, *settings)
+        start = intake.given.start_key(edge)
+        return work_key("pair", *hashes, intake.diameter, *settings, *start)
 
     with stages.stage("pairs") as counts:
         results = stages.each("pairs", register, edges, key)
@@ -127,6 +136,7 @@ def pair_registrar(
     contours: ContourMatcher,
     diameter: float,
     config: Config,
+    starts: Mapping[Edge, Pose] | None = None,
 ) -> Callable[[Edge], PairResult]:
     """What registers a pair (i, j), i < j, of the given scans: the search, then its best refined.
 
@@ -137,7 +147,9 @@ def pair_registrar(
         contours: Finds contour matches of two scans.
         diameter: Diameter of the run, in the scans' unit.
         config: Settings.
+        starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
     """
+    starts = starts or {}
     anchors = [
         pair_anchors(field, found, config.pairs)
         for field, found in zip(fields, features, strict=True)
@@ -157,7 +169,9 @@ def pair_registrar(
             return i_from_j
 
         both = list(zip(anchors[i], anchors[j], strict=True))
-        return register_pair(i, j, fields[i], fields[j], both, diameter, config.pairs, polish)
+        return register_pair(
+            i, j, fields[i], fields[j], both, diameter, config.pairs, polish, starts.get(edge)
+        )
 
     return register
 

@@ -1,9 +1,9 @@
 """Scans -> reconstruction by the method as published: PA-HKS and ICP, then MM-ICC.
 
 The readings of the paper are settings, ``coarse`` and ``contours``; nothing else finds or moves a
-pose. What the paper takes for granted is added: it is told which views are adjacent, and does not
-ask whether its answer is right. Here the evidence of the pairs says both, as it does for the
-robust method.
+pose, unless users give start poses. What the paper takes for granted is added: it is told which
+views are adjacent, and does not ask whether its answer is right. Here the evidence of the pairs
+says both, as it does for the robust method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,6 +26,7 @@ from scanweld.pairs.verdict import no_pose
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
 from scanweld.steps import (
+    check_knowledge,
     describe_scans,
     fuse_largest,
     lay_out,
@@ -48,7 +49,8 @@ def reconstruct_as_published(intake: Intake, config: Config, stages: Stages) -> 
     graph = _choose_adjacent_views(intake, fields, pairs, config, stages)
     graph = _refine(intake, fields, graph, config, stages)
     mesh = fuse_largest(intake, graph, config, stages)
-    return conclude(intake, features, fields, graph, mesh, config, stages.reports)
+    facts = check_knowledge(intake, fields, graph, config)
+    return conclude(intake, features, fields, graph, mesh, facts, config, stages.reports)
 
 
 def _register_pairs(
@@ -58,7 +60,10 @@ def _register_pairs(
     config: Config,
     stages: Stages,
 ) -> dict[Edge, PairResult]:
-    """Every pair by the coarse step (paper 3.1) and MM-ICC of its two views (3.2), and judged."""
+    """Every pair by the coarse step (paper 3.1) and MM-ICC of its two views (3.2), and judged.
+
+    Where a start pose is given, MM-ICC is run from there too, and what is judged better is kept.
+    """
     prepared = intake.prepared
     edges = list(combinations(range(len(prepared)), 2))
 
@@ -67,17 +72,23 @@ def _register_pairs(
         coarse = register_as_published(
             prepared[i], prepared[j], features[i], features[j], config.coarse
         )
-        if coarse.i_from_j is None:
+        starts = [coarse.i_from_j, intake.given.starts.get(edge)]
+        results = [refined(edge, start) for start in starts if start is not None]
+        if not results:
             return no_pose(i, j, coarse.reason)
-        start = {i: Pose.identity(), j: coarse.i_from_j}
-        fine = mm_icc(prepared, start, [edge], config.contours).poses
+        return max(results, key=lambda result: result.alternatives[0].score)
+
+    def refined(edge: Edge, start: Pose) -> PairResult:
+        i, j = edge
+        fine = mm_icc(prepared, {i: Pose.identity(), j: start}, [edge], config.contours).poses
         i_from_j = fine[i].inverse() @ fine[j]
         return judge_pose(i, j, fields[i], fields[j], i_from_j, intake.diameter, config.pairs)
 
     def key(edge: Edge) -> str:
         hashes = [prepared[k].content_hash for k in edge]
         settings = (config.prepare, config.heat, config.coarse, config.contours, config.pairs)
-        return work_key("published pair", *hashes, intake.diameter, *settings)
+        start = intake.given.start_key(edge)
+        return work_key("published pair", *hashes, intake.diameter, *settings, *start)
 
     with stages.stage("pairs") as counts:
         results = stages.each("pairs", register, edges, key)

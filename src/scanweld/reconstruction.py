@@ -112,6 +112,29 @@ class PairReport:
     alternatives: tuple[AlternativeReport, ...] = ()
 
 
+class FactVerdict(StrEnum):
+    """One fact that users gave, in one word."""
+
+    HELD = "held"
+    OPEN = "open"
+    CONTRADICTED = "contradicted"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FactReport:
+    """What became of one fact that users gave.
+
+    Attributes:
+        fact: What was given, such as "together a b".
+        verdict: Whether the evidence bears it out, leaves it open or speaks against it.
+        reason: Why, in a sentence.
+    """
+
+    fact: str
+    verdict: FactVerdict
+    reason: str
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class StageReport:
     """Time and memory of a stage, and what it counted.
@@ -134,7 +157,7 @@ class Reconstruction:
     Attributes:
         poses: world_from_scan of every placed scan, in the frame of its own component.
         components: Names of the scans of each component, largest first, each with its reference
-            scan (whose pose is the identity) first.
+            scan first, whose pose is the identity unless users fixed it elsewhere.
         unplaced: Reason for every scan that has no pose.
         scans: Report of every scan.
         pairs: Report of every pair, ordered by names.
@@ -144,6 +167,7 @@ class Reconstruction:
         reasons: Why it is not good, in sentences.
         stages: Time and memory per stage, in the order of the run.
         config: The resolved settings.
+        knowledge: What became of the facts that users gave; empty if they gave none.
     """
 
     poses: Mapping[str, Pose]
@@ -156,3 +180,4 @@ class Reconstruction:
     reasons: tuple[str, ...]
     stages: Mapping[str, StageReport]
     config: Config
+    knowledge: tuple[FactReport, ...] = ()

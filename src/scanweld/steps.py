@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from scanweld.config import Config
 from scanweld.errors import InputError
+from scanweld.findings import Outcome, check_facts
 from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
@@ -13,12 +14,15 @@ from scanweld.heat.features import Features, describe
 from scanweld.intake import Intake
 from scanweld.multiview.assemble import Settle, build_view_graph
 from scanweld.multiview.explain import find_doubts
+from scanweld.multiview.given import easier_verdict, pairs_as_given, with_given
 from scanweld.multiview.merge import Judge
 from scanweld.multiview.refine_graph import Refine, refine_graph
+from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
 from scanweld.pairs.result import Evidence, PairResult
 from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.reconstruction import FactReport
 from scanweld.stages import Stages, work_key
 
 logger = logging.getLogger(__name__)
@@ -68,26 +72,31 @@ def place_scans(
     config: Config,
     stages: Stages,
 ) -> ViewGraph:
-    """Place what the pairs can place together without contradiction.
+    """Place what the pairs can place together without contradiction, as far as is given.
 
     Args:
-        intake: The scans, prepared.
+        intake: The scans, prepared, and what is given of them.
         fields: The scans laid out.
         pairs: Every pair, judged.
         settle: Refines the poses of a component as it grows.
         config: Settings.
         stages: Bookkeeping of the run.
     """
+    given = intake.given
     with stages.stage("graph") as counts:
+        easier = easier_verdict(fields, intake.diameter, config.pairs)
+        axis = _common_axis(intake, fields, pairs, config)
         graph = build_view_graph(
             len(fields),
-            pairs,
+            pairs_as_given(pairs, given, axis, easier),
             [field.centre for field in fields],
             intake.diameter,
             pair_judge(fields, intake.diameter, config),
             settle,
             config.graph,
+            given.apart,
         )
+        graph = with_given(graph, pairs, given)
         counts["accepted"] = len(graph.accepted)
         counts["components"] = len(graph.components)
     return graph
@@ -104,7 +113,7 @@ def refine_placed(
     """Refine each component's poses together (paper 3.2), and doubt what comes out.
 
     Args:
-        intake: The scans, prepared.
+        intake: The scans, prepared, and what is given of them.
         fields: The scans laid out.
         graph: Components with the poses that the pairs gave them.
         refine: The joint refinement of a component.
@@ -114,22 +123,61 @@ def refine_placed(
     judge_pair = pair_judge(fields, intake.diameter, config)
     with stages.stage("refine") as counts:
         graph = refine_graph(graph, refine, judge_pair)
-        graph = replace(graph, doubts=find_doubts(graph, judge_pair, config.graph))
+        doubts = find_doubts(graph, judge_pair, config.graph)
+        axis = _common_axis(intake, fields, graph.pairs, config)
+        if axis is not None:
+            doubts = {**off_axis_doubts(graph, axis), **doubts}
+        graph = replace(graph, doubts=doubts)
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     return graph
 
 
+def _common_axis(
+    intake: Intake,
+    fields: Sequence[ScanField],
+    pairs: Mapping[Edge, PairResult],
+    config: Config,
+) -> Turntable | None:
+    """The axis about which most good pairs turn, in frames of the sensors or of the files.
+
+    None if the scans are not said to have one.
+    """
+    if not intake.given.turntable:
+        return None
+    sensors = [Pose.identity() for _ in fields]
+    files = [scan.scan_from_sensor for scan in intake.prepared]
+    near = config.graph.max_cycle_deg, config.graph.max_cycle_diameters * intake.diameter
+    return find_turntable(pairs, [sensors, files], [field.centre for field in fields], near)
+
+
+def check_knowledge(
+    intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config
+) -> tuple[FactReport, ...]:
+    """Every fact that users gave against what was found."""
+    outcome = Outcome(
+        prepared=intake.prepared,
+        graph=graph,
+        centres=[field.centre for field in fields],
+        diameter=intake.diameter,
+        judge=pair_judge(fields, intake.diameter, config),
+        turntable=_common_axis(intake, fields, graph.pairs, config),
+    )
+    return check_facts(intake.knowledge, outcome)
+
+
 def fuse_largest(
     intake: Intake, graph: ViewGraph, config: Config, stages: Stages
 ) -> TriangleMesh | None:
-    """The surface of the largest component, in the scan frame of its reference; None without."""
+    """The surface of the largest component, in its world; None without."""
     if not graph.components:
         return None
     component = graph.components[0]
     order = sorted(component.poses)
     prepared = intake.prepared
-    world_from_reference = prepared[component.reference].scan_from_sensor
+    world_from_reference = component.world_from_reference(
+        prepared[component.reference].scan_from_sensor
+    )
     with stages.stage("fuse") as counts:
         try:
             mesh = fuse(

@@ -1,6 +1,7 @@
 """The command line: thin commands over the library.
 
-Exit codes: 0 good, 1 error, 2 usage, 3 a verdict other than good, 130 interrupted.
+Exit codes: 0 good, 1 error, 2 usage (or facts that cannot be about these scans), 3 a verdict other
+than good, 130 interrupted.
 """
 
 import sys
@@ -16,19 +17,22 @@ import typer
 from scanweld.app.comparison import compare, comparison_table
 from scanweld.app.info import describe_scan
 from scanweld.app.job import run_job
+from scanweld.app.named_pairs import named_pairs, with_pairs_joined
 from scanweld.app.progress import reporting
 from scanweld.app.summary import summary
 from scanweld.app.workspace import work_folder
 from scanweld.config import load_config
-from scanweld.errors import ScanweldError
+from scanweld.errors import KnowledgeError, ScanweldError
 from scanweld.evaluation.metrics import Standing
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.simulate import TYPICAL_NOISE
 from scanweld.evaluation.simulate import simulate as make_scans
 from scanweld.geometry.camera import CameraModel
-from scanweld.io import collect, read_mesh, read_scan
+from scanweld.io import collect, read_mesh, read_poses, read_scan
+from scanweld.knowledge import Knowledge, read_knowledge
 
 ERROR = 1
+USAGE = 2
 NOT_GOOD = 3
 INTERRUPTED = 130
 
@@ -79,6 +83,27 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log."
 MethodOption = Annotated[
     MethodName | None, typer.Option(help="robust (the default), or paper: as published.")
 ]
+Known = Annotated[
+    Path | None, typer.Option("--knowledge", help="The five that follow, as a JSON file.")
+]
+Fix = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="The frame of this scan is the world. Can be repeated."),
+]
+Start = Annotated[
+    Path | None, typer.Option(help="Poses to be tried besides, a poses.json; never just believed.")
+]
+Together = Annotated[
+    list[str] | None,
+    typer.Option(metavar="A B", help="Two scans see some of the same surface. Can be repeated."),
+]
+Apart = Annotated[
+    list[str] | None,
+    typer.Option(metavar="A B", help="Two scans must not be laid together. Can be repeated."),
+]
+TurntableFlag = Annotated[
+    bool, typer.Option("--turntable", help="All scans turn about one, unknown axis.")
+]
 UnitOption = Annotated[LengthUnit | None, typer.Option(help="Unit of the scans' coordinates.")]
 
 
@@ -91,6 +116,12 @@ def run(
     seed: Seed = None,
     unit: UnitOption = None,
     method: MethodOption = None,
+    knowledge: Known = None,
+    fix: Fix = None,
+    start: Start = None,
+    together: Together = None,
+    apart: Apart = None,
+    turntable: TurntableFlag = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -102,10 +133,25 @@ def run(
         unit=None if unit is None else unit.value,
         method=None if method is None else method.value,
     )
+    known = Knowledge(
+        fix=tuple(fix or ()),
+        start=None if start is None else read_poses(start),
+        together=named_pairs("--together", together),
+        apart=named_pairs("--apart", apart),
+        turntable=turntable,
+    )
+    if knowledge is not None:
+        known = read_knowledge(knowledge).joined(known)
     try:
         with reporting(quiet=quiet, verbose=verbose) as progress:
             result = run_job(
-                inputs, output, settings, workers=workers, force=force, progress=progress
+                inputs,
+                output,
+                settings,
+                knowledge=known,
+                workers=workers,
+                force=force,
+                progress=progress,
             )
     except KeyboardInterrupt:
         kept = work_folder(output)
@@ -194,7 +240,8 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point of the command ``scanweld``; always leaves by ``SystemExit``."""
     try:
-        app(args=None if arguments is None else list(arguments), prog_name="scanweld")
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        app(args=with_pairs_joined(given), prog_name="scanweld")
     except ScanweldError as error:
         _print_error(error)
-        sys.exit(ERROR)
+        sys.exit(USAGE if isinstance(error, KnowledgeError) else ERROR)

@@ -10,6 +10,7 @@ from scanweld.config import Config
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, collect, printable, read_scan
+from scanweld.knowledge import Knowledge
 from scanweld.progress import Progress, silent
 from scanweld.reconstruction import Reconstruction
 
@@ -19,6 +20,7 @@ def run_job(
     output: Path | str,
     config: Config | None = None,
     *,
+    knowledge: Knowledge | None = None,
     workers: int | None = None,
     force: bool = False,
     progress: Progress = silent,
@@ -29,6 +31,7 @@ def run_job(
         inputs: Files, folders and glob patterns.
         output: The folder to be made; it appears when it is whole.
         config: Settings; the defaults if not given.
+        knowledge: What is known of the scans beforehand.
         workers: Threads; as many as there are cores if not given.
         force: Whether an output that is there already is replaced.
         progress: Called with (stage, done, total).
@@ -44,6 +47,7 @@ def run_job(
         result = pipeline.run(
             scans,
             config or Config(),
+            knowledge=knowledge,
             unreadable=unreadable,
             workers=workers,
             cache=workspace.cache,

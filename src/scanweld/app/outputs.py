@@ -44,11 +44,13 @@ def graph_json(result: Reconstruction) -> Json:
 def report_json(result: Reconstruction) -> Json:
     """The verdict, as a whole and scan by scan, the stages' costs and the settings."""
     names = sorted(result.scans, key=natural_key)
+    facts = [asdict(fact) for fact in result.knowledge]
     return {
         "format": FORMAT,
         "verdict": result.verdict.value,
         "exit_code": result.verdict.exit_code,
         "reasons": list(result.reasons),
+        **({"knowledge": facts} if facts else {}),
         "scans": {name: asdict(result.scans[name]) for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),

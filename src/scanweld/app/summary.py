@@ -19,6 +19,7 @@ def summary(result: Reconstruction, output: Path) -> str:
     lines += [f"  doubtful {name}: {reason}" for name, reason in _in_order(doubtful)]
     if len(result.components) > 1:
         lines += [f"  component {k + 1}: {', '.join(c)}" for k, c in enumerate(result.components)]
+    lines += [f"  {fact.verdict} {fact.fact}: {fact.reason}" for fact in result.knowledge]
     if result.poses and result.mesh is None:
         lines.append("  no model: the placed scans could not be fused")
     lines.append(f"  {output}: {', '.join(_files(result))}")

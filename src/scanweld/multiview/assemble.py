@@ -2,7 +2,7 @@
 
 import hashlib
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scanweld.config import GraphConfig
@@ -20,6 +20,7 @@ from scanweld.multiview.merge import (
 )
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.verdict import MIN_AGREE
 
 logger = logging.getLogger(__name__)
 
@@ -54,6 +55,7 @@ class _Problem:
     judge: Judge
     settle: Settle
     config: GraphConfig
+    apart: Collection[Edge]
     memory: "_Memory" = field(default_factory=lambda: _Memory(merges={}, settled={}))
 
 
@@ -73,6 +75,7 @@ def build_view_graph(
     judge: Judge,
     settle: Settle,
     config: GraphConfig,
+    apart: Collection[Edge] = (),
 ) -> ViewGraph:
     """Place all scans that the pairs can place without contradiction.
 
@@ -89,6 +92,7 @@ def build_view_graph(
         judge: Gives the evidence on any pair at any pose.
         settle: Refines a component's poses.
         config: Settings.
+        apart: Pairs whose scans no merge may lay onto each other.
     """
     near = (config.max_cycle_deg, config.max_cycle_diameters * diameter)
     problem = _Problem(
@@ -99,6 +103,7 @@ def build_view_graph(
         judge=judge,
         settle=settle,
         config=config,
+        apart=apart,
     )
     best = _assemble(problem, frozenset())
     banned: frozenset[tuple[int, int, int]] = frozenset()
@@ -154,10 +159,20 @@ def _best_merge(
 def _merges(problem: _Problem, a: Poses, b: Poses) -> list[Merge]:
     key = _content(a), _content(b)
     if key not in problem.memory.merges:
-        problem.memory.merges[key] = propose_merges(
-            a, b, problem.pairs, problem.centres, problem.near, problem.judge
-        )
+        merges = propose_merges(a, b, problem.pairs, problem.centres, problem.near, problem.judge)
+        problem.memory.merges[key] = [m for m in merges if not _joins_apart(problem, a, b, m)]
     return problem.memory.merges[key]
+
+
+def _joins_apart(problem: _Problem, a: Poses, b: Poses, merge: Merge) -> bool:
+    """Whether a merge lays scans onto each other that are apart."""
+    for i, j in problem.apart:
+        first, second = (i, j) if i in a else (j, i)
+        if first in a and second in b:
+            pose = a[first].inverse() @ merge.a_from_b @ b[second]
+            if problem.judge(first, second, pose).agree >= MIN_AGREE:
+                return True
+    return False
 
 
 def _settled(problem: _Problem, poses: Poses) -> Poses:
@@ -187,7 +202,7 @@ def passes(merge: Merge, config: GraphConfig) -> bool:
         return merge.score > 0
     # Weak pairs count only where several of them, found separately, say the same.
     is_clean = merge.violated <= config.max_mutual_violated_share * merge.agree
-    return len(merge.supports) > 1 and is_clean and merge.score >= config.min_mutual_score
+    return merge.num_voices > 1 and is_clean and merge.score >= config.min_mutual_score
 
 
 def _accepted(

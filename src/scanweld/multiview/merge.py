@@ -39,6 +39,7 @@ class Support:
         score: Its score.
         agree: Share of the samples that agree in it.
         is_good: Whether it is the best of a good pair.
+        is_given: Whether it comes from start poses alone.
     """
 
     i: int
@@ -47,6 +48,7 @@ class Support:
     score: float
     agree: float
     is_good: bool
+    is_given: bool = False
 
     @property
     def alternative(self) -> tuple[int, int, int]:
@@ -75,6 +77,12 @@ class Merge:
     free: float
     worst: float
     margin: float = 1.0
+
+    @property
+    def num_voices(self) -> int:
+        """How many found it on their own: start poses say the same of all pairs, and count once."""
+        found = sum(not support.is_given for support in self.supports)
+        return found + (found < len(self.supports))
 
     @property
     def score(self) -> float:
@@ -143,6 +151,7 @@ def _proposals(
                     score=option.score,
                     agree=option.evidence.agree,
                     is_good=is_good,
+                    is_given=option.is_given,
                 )
                 found.append((a[i] @ i_from_j @ b[j].inverse(), support))
     found.sort(key=lambda proposal: -proposal[1].score)

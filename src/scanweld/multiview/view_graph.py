@@ -15,11 +15,19 @@ class Component:
 
     Attributes:
         poses: component_from_sensor of each scan, the reference scan's the identity.
-        reference: The best-supported scan.
+        reference: The best-supported scan, or one that is fixed.
+        world_from_scan: Where the frame of the reference scan is fixed; the world is that frame
+            if not given.
     """
 
     poses: Mapping[int, Pose]
     reference: int
+    world_from_scan: Pose | None = None
+
+    def world_from_reference(self, scan_from_sensor: Pose) -> Pose:
+        """Pose of the reference's sensor in the world, from that in its scan's frame."""
+        fixed = self.world_from_scan
+        return scan_from_sensor if fixed is None else fixed @ scan_from_sensor
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -34,6 +42,7 @@ class ViewGraph:
         unplaced: Why the other scans are in none.
         doubts: What speaks against a placed scan's final pose, in words.
         rms: Point-to-plane residual of each placed scan after the joint refinement.
+        remarks: Of accepted pairs that are believed for what is given beforehand.
     """
 
     pairs: Mapping[Edge, PairResult]
@@ -43,6 +52,7 @@ class ViewGraph:
     unplaced: Mapping[int, str]
     doubts: Mapping[int, str] = field(default_factory=dict)
     rms: Mapping[int, float] = field(default_factory=dict)
+    remarks: Mapping[Edge, str] = field(default_factory=dict)
 
     def neighbours(self, scan: int) -> tuple[int, ...]:
         """Scans that share an accepted pair with one, in order."""

@@ -1,6 +1,7 @@
 """Two scans -> distinct relative poses with their evidence, from any start pose."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,6 +51,7 @@ def register_pair(
     diameter: float,
     config: PairsConfig,
     polish: Polish | None = None,
+    start: Pose | None = None,
 ) -> PairResult:
     """Find the poses that explain two scans best, coarse to fine, whatever their frames are.
 
@@ -62,6 +64,7 @@ def register_pair(
         diameter: Diameter of the run.
         config: Settings.
         polish: Refines the best poses once more; what makes the evidence worse is not taken.
+        start: A pose to be tried besides, judged like those that are found.
 
     Returns:
         The result, with pose i_from_j between the sensor frames.
@@ -77,6 +80,9 @@ def register_pair(
     alternatives = _ranked([alternative_at(field_i, field_j, to_pose(row), fine) for row in poses])
     if polish is not None:
         alternatives = _ranked(_polished(field_i, field_j, alternatives, polish, fine))
+    if start is not None:
+        given = _from_start(field_i, field_j, start, diameter, fine, polish)
+        alternatives = _with_given(alternatives, given, field_j, diameter)
     return result_of(i, j, field_i, field_j, tuple(alternatives), diameter, config)
 
 
@@ -144,6 +150,43 @@ def _polished(
             if option.score > alternative.score - MAX_POLISHING_LOSS:
                 polished[k] = option
     return polished
+
+
+def _from_start(
+    i: ScanField,
+    j: ScanField,
+    start: Pose,
+    diameter: float,
+    tolerance: float,
+    polish: Polish | None,
+) -> Alternative:
+    """The best of a start pose, refined from near and from far: thin overlap may not pull right."""
+    far, near = _schedules(diameter)
+    rows = pose_rows([start])
+    tries = [rows, icp(i, j, rows, near, diameter)]
+    tries.append(icp(i, j, icp(i, j, rows, far, diameter), near, diameter))
+    options = _ranked([alternative_at(i, j, to_pose(row), tolerance) for (row,) in tries])
+    if polish is not None:
+        options = _polished(i, j, options[:1], polish, tolerance)
+    return replace(options[0], is_given=True)
+
+
+def _with_given(
+    alternatives: Sequence[Alternative], given: Alternative, j: ScanField, diameter: float
+) -> list[Alternative]:
+    """The alternatives and a given one; where the search found it too, the better of the two."""
+    same = [option for option in alternatives if is_same(option, given, j, diameter)]
+    if same and same[0].score >= given.score:
+        return list(alternatives)
+    others = [option for option in alternatives if option not in same]
+    return _ranked([*others, replace(given, is_given=not same)])
+
+
+def is_same(a: Alternative, b: Alternative, j: ScanField, diameter: float) -> bool:
+    """Whether two poses of a pair are the same answer, not rivals."""
+    apart = a.i_from_j.inverse() @ b.i_from_j
+    near = apart.shift_at(j.centre) < RIVAL_SHIFT_DIAMETERS * diameter
+    return near and apart.angle_deg() < RIVAL_ANGLE_DEG
 
 
 def score_poses(

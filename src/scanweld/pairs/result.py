@@ -76,10 +76,17 @@ def margin_over(score: float, rivals: Sequence[float]) -> float:
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Alternative:
-    """A pose of a pair with its evidence. The frames are those of the result it belongs to."""
+    """A pose of a pair with its evidence. The frames are those of the result it belongs to.
+
+    Attributes:
+        i_from_j: The pose.
+        evidence: What both sensors say of it.
+        is_given: Whether it comes from a start pose alone: the search did not find it.
+    """
 
     i_from_j: Pose
     evidence: Evidence
+    is_given: bool = False
 
     @property
     def score(self) -> float:

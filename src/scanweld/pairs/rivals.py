@@ -6,14 +6,8 @@ from scanweld.config import PairsConfig
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.register import (
-    RIVAL_ANGLE_DEG,
-    RIVAL_SHIFT_DIAMETERS,
-    alternative_at,
-    register_pair,
-    result_of,
-)
-from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.register import alternative_at, is_same, register_pair, result_of
+from scanweld.pairs.result import PairKind, PairResult
 
 
 def judge_pose(
@@ -48,12 +42,6 @@ def judge_pose(
         (even_anchors(field_i, config.num_anchors), even_anchors(field_j, config.num_anchors))
     ]
     found = register_pair(i, j, field_i, field_j, anchors, diameter, config).alternatives
-    rivals = [option for option in found if not _is_same(option, given, field_j, diameter)]
+    rivals = [option for option in found if not is_same(option, given, field_j, diameter)]
     judged = result_of(i, j, field_i, field_j, (given, *rivals), diameter, config)
     return replace(judged, alternatives=(given,))
-
-
-def _is_same(a: Alternative, b: Alternative, j: ScanField, diameter: float) -> bool:
-    apart = a.i_from_j.inverse() @ b.i_from_j
-    near = apart.shift_at(j.centre) < RIVAL_SHIFT_DIAMETERS * diameter
-    return near and apart.angle_deg() < RIVAL_ANGLE_DEG
