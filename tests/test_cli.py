@@ -157,6 +157,46 @@ def test_the_method_may_come_from_the_settings_or_the_command(scans: Path):
     assert json.loads(Path("c/report.json").read_text())["settings"]["method"] == "robust"
 
 
+def test_facts_reach_the_run(scans: Path, monkeypatch: pytest.MonkeyPatch):
+    seen: dict[str, Any] = {}
+
+    def run(*arguments: Any, **settings: Any) -> object:
+        seen.update(settings)
+        return stub_run(*arguments, **settings)
+
+    monkeypatch.setattr(job.pipeline, "run", run)
+    Path("facts.json").write_text('{"apart": [["c", "b"]], "fix": ["c"]}')
+    write_poses("p.json", PoseSet(poses={"a": turned(1)}, components=(("a",),)))
+    together = ["--together", "b", "a", "--together", "c", "a"]
+    options = ["--fix", "a", "--start", "p.json", *together, "--turntable"]
+    assert scanweld("run", *options, scans, "-o", "model", "--knowledge", "facts.json") == 0
+    known = seen["knowledge"]
+    assert known.fix == ("c", "a") and known.turntable
+    assert known.together == (("a", "b"), ("a", "c")) and known.apart == (("b", "c"),)
+    assert np.array_equal(known.start.poses["a"].matrix(), turned(1).matrix())
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--fix", "d"], "fix: no scan is called d; there are a, b, c"),
+        (["--together", "a", "d"], "together: no scan is called d"),
+        (["--together", "a", "b", "--apart", "b", "a"], "both together and apart"),
+        (["--apart", "a", "a"], "a is named twice"),
+        (["--together", "a", "--quiet"], "--together takes the names of two scans, not just a"),
+        (["--start", "p.json"], "start: has a pose for none of the scans"),
+        (["--knowledge", "p.json"], "p.json: format: no such fact"),
+    ],
+)
+def test_facts_that_cannot_be_meant_exit_with_2(
+    scans: Path, options: list[str], says: str, capsys: pytest.CaptureFixture[str]
+):
+    write_poses("p.json", PoseSet(poses={"x": turned(1)}, components=(("x",),)))
+    assert scanweld("run", scans, "-o", "model", *options) == 2
+    assert says in error_line(capsys)
+    assert not Path("model").exists() and not work_folder(Path("model")).exists()
+
+
 def test_version_and_help(capsys: pytest.CaptureFixture[str]):
     assert scanweld("--version") == 0
     assert capsys.readouterr().out.startswith("scanweld 0.")

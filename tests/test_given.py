@@ -1,0 +1,232 @@
+"""What is given beforehand, on drawn pairs with known truth: axes, weights of start poses."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scanweld.config import GraphConfig, PairsConfig
+from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.multiview.assemble import build_view_graph
+from scanweld.multiview.given import Given, pairs_as_given, with_given
+from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
+from scanweld.multiview.view_graph import Component, Edge, ViewGraph
+from scanweld.pairs.anchors import even_anchors
+from scanweld.pairs.register import register_pair
+from scanweld.pairs.result import PairKind, PairResult
+from tests.prepared import creature_pair
+from tests.test_view_graph import (
+    CENTRE,
+    WEAK,
+    Pairs,
+    exact_pair,
+    exact_pairs,
+    judge_of,
+    only_component,
+    option,
+    pair_of,
+    scans_of,
+    stay,
+    turn_about_centre,
+    turned,
+    world_of,
+)
+
+NEAR = (5.0, 0.03)
+
+
+def table_of(angles_deg: Sequence[float], seed: int = 0) -> tuple[list[Pose], Pose]:
+    """Poses of sensors around an axis that is drawn, and the pose of the axis (its z) in them."""
+    rng = np.random.default_rng(seed)
+    sensor_from_axis = Pose(rotation=random_rotation(rng), translation=CENTRE)
+    turns = [Pose.exp([0, 0, np.radians(angle), 0, 0, 0]) for angle in angles_deg]
+    return [turn @ sensor_from_axis.inverse() for turn in turns], sensor_from_axis
+
+
+def axis_of(pairs: Pairs, num_scans: int) -> Turntable | None:
+    frames = [[Pose.identity()] * num_scans]
+    return find_turntable(pairs, frames, [CENTRE] * num_scans, NEAR)
+
+
+def every_edge(num_scans: int) -> list[Edge]:
+    return [(i, j) for i in range(num_scans) for j in range(i + 1, num_scans)]
+
+
+def assert_axis(found: Turntable | None, sensor_from_axis: Pose, tolerance: float = 1e-6) -> None:
+    assert found is not None
+    direction = sensor_from_axis.rotation[:, 2]
+    assert abs(abs(float(found.axis.direction @ direction)) - 1) < tolerance
+    apart = found.axis.point - sensor_from_axis.translation
+    assert np.linalg.norm(apart - direction * float(apart @ direction)) < tolerance
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    steps=st.lists(st.integers(20, 100), min_size=2, max_size=5),
+    off_deg=st.integers(20, 160),
+)
+def test_the_axis_is_found_whatever_one_scan_off_it_says(seed: int, steps: list[int], off_deg: int):
+    """The last scan is tilted, and all its pairs are good; the axis stays that of the others."""
+    angles = [0, *np.cumsum(steps)]
+    world, sensor_from_axis = table_of(angles, seed)
+    tilt = Pose.exp([np.radians(off_deg), 0, 0, 0, 0, 0])
+    world.append(tilt @ world[-1])
+    num = len(world)
+    found = axis_of(exact_pairs(every_edge(num), world), num)
+    assert_axis(found, sensor_from_axis)
+    assert found is not None and found.num_scans == num - 1
+    assert found.angle_deg < 1e-5 and found.shift < 1e-6
+
+
+def test_the_axis_is_that_of_most_scans_not_of_most_or_surest_pairs():
+    """Five scans on one table, a chain of weak pairs; four on another, each with each, and sure."""
+    table, sensor_from_axis = table_of([0, 30, 75, 130, 200], seed=1)
+    world = [*table, *table_of([0, 40, 90, 150], seed=2)[0]]
+    chain = [(0, 1), (1, 2), (2, 3), (3, 4)]
+    each = [(i + 5, j + 5) for i, j in every_edge(4)]
+    found = axis_of(exact_pairs([*chain, *each], world, dict.fromkeys(chain, 0.2)), len(world))
+    assert_axis(found, sensor_from_axis)
+    assert found is not None and set(found.edges) == set(chain) and found.num_scans == 5
+
+
+def test_the_axis_is_found_in_the_frames_of_the_files_where_the_sensors_have_none():
+    """Sensors whose frames were made up scan by scan; but the files are in the scanner's."""
+    world, sensor_from_axis = table_of([0, 40, 100, 190])
+    rng = np.random.default_rng(1)
+    files = [Pose(rotation=random_rotation(rng), translation=rng.normal(size=3)) for _ in range(4)]
+    pairs = exact_pairs(every_edge(4), [w @ f for w, f in zip(world, files, strict=True)])
+    made_up = [Pose.identity()] * 4
+    assert axis_of(pairs, 4) is None
+    found = find_turntable(pairs, [made_up, files], [CENTRE] * 4, NEAR)
+    assert_axis(found, sensor_from_axis)
+
+
+def test_residuals_are_those_of_the_pairs():
+    world, sensor_from_axis = table_of([0, 50, 110, 160, 230])
+    pairs = exact_pairs(every_edge(5), world)
+    for n, edge in enumerate(pairs):
+        pairs[edge] = turned(pairs[edge], degrees=0.5 * (-1) ** n)
+    found = axis_of(pairs, 5)
+    assert_axis(found, sensor_from_axis, tolerance=0.01)
+    assert found is not None and 0.1 < found.angle_deg < 0.5
+
+
+@pytest.mark.parametrize("num_scans", [3, 4, 6])
+def test_scans_from_anywhere_have_no_common_axis(num_scans: int):
+    world = world_of(num_scans)
+    assert axis_of(exact_pairs(every_edge(num_scans), world), num_scans) is None
+
+
+def test_one_pair_is_no_axis():
+    world, _ = table_of([0, 40])
+    assert axis_of(exact_pairs([(0, 1)], world), 2) is None
+
+
+def test_final_poses_off_the_axis_are_doubtful():
+    world, _ = table_of([0, 40, 100, 190])
+    pairs = exact_pairs(every_edge(4), world)
+    found = axis_of(pairs, 4)
+    assert found is not None
+    slid = [*world[:3], world[3] @ turn_about_centre(2.0)]
+    component = Component(poses=dict(enumerate(slid)), reference=0)
+    graph = ViewGraph(pairs=pairs, accepted={}, rejected={}, components=(component,), unplaced={})
+    doubts = off_axis_doubts(graph, found)
+    assert set(doubts) == {3} and "deg off the axis" in doubts[3]
+    right = replace(graph, components=(replace(component, poses=dict(enumerate(world))),))
+    assert not off_axis_doubts(right, found)
+
+
+def placed(world: Sequence[Pose], pairs: Pairs, known: Given, table: Turntable | None) -> ViewGraph:
+    """The view graph of what is given; nothing is easier than usual."""
+
+    def as_usual(edge: Edge, alternatives: object) -> PairResult:
+        return pairs[edge]
+
+    centres = [CENTRE] * len(world)
+    usable = pairs_as_given(pairs, known, table, as_usual)
+    graph = build_view_graph(
+        len(world), usable, centres, 1.0, judge_of(world, pairs), stay, GraphConfig(), known.apart
+    )
+    return with_given(graph, pairs, known)
+
+
+def test_a_rival_off_the_axis_is_none():
+    """0-3 has a wrong pose first; it is off the axis, and 3 is placed by the other."""
+    world, _ = table_of([0, 40, 100, 190])
+    pairs = exact_pairs([(0, 1), (1, 2), (0, 2)], world)
+    true = exact_pair(0, 3, world, 0.3).alternatives[0]
+    wrong = option(true.i_from_j @ turn_about_centre(90, (0.8, 0.6, 0.0)), 0.35)
+    pairs[0, 3] = pair_of(0, 3, PairKind.AMBIGUOUS, wrong, true)
+    pairs[1, 3] = exact_pair(1, 3, world, WEAK, PairKind.NO_OVERLAP)
+    table = axis_of(pairs, 4)
+    graph = placed(world, pairs, Given(turntable=True), table)
+    assert scans_of(only_component(graph, world)) == {0, 1, 2, 3}
+    assert graph.accepted[0, 3] is true and graph.pairs is pairs
+
+
+def weak_triangle(world: Sequence[Pose], *, num_given: int) -> Pairs:
+    """0-1 is good; 0-2 and 1-2 are weak, and so many of them come from start poses alone."""
+    pairs = exact_pairs([(0, 1)], world)
+    for n, edge in enumerate([(0, 2), (1, 2)]):
+        weak = exact_pair(*edge, world, WEAK, PairKind.NO_OVERLAP)
+        given_one = replace(weak.alternatives[0], is_given=n < num_given)
+        pairs[edge] = replace(weak, alternatives=(given_one,))
+    return pairs
+
+
+@pytest.mark.parametrize(("num_given", "num_placed"), [(0, 3), (1, 3), (2, 2)])
+def test_start_poses_are_one_voice_however_many_pairs_they_speak_for(
+    num_given: int, num_placed: int
+):
+    """Weak pairs place a scan where they say the same, found separately; start poses are not."""
+    world = world_of(3)
+    pairs = weak_triangle(world, num_given=num_given)
+    graph = placed(world, pairs, Given(), None)
+    (component,) = graph.components
+    assert len(component.poses) == num_placed
+
+
+def test_pairs_apart_are_not_joined_by_others():
+    """0-1-2-3, all good; 0 and 3 are apart but would lie on each other."""
+    world = world_of(4)
+    pairs = exact_pairs([(0, 1), (1, 2), (2, 3), (0, 3)], world)
+    graph = placed(world, pairs, Given(apart=frozenset({(0, 3)})), None)
+    for component in graph.components:
+        assert not {0, 3} <= set(component.poses)
+    assert graph.rejected[0, 3] == "said to be apart"
+    assert (0, 3) not in graph.accepted
+
+
+def test_the_first_fixed_scan_is_the_reference():
+    world = world_of(4)
+    pairs = exact_pairs([(0, 1), (1, 2), (2, 3)], world)
+    place = Pose.exp([0.1, 0.2, 0.3, 4, 5, 6])
+    fixed = {3: place, 1: Pose.identity()}
+    graph = placed(world, pairs, Given(fixed=fixed), None)
+    component = only_component(graph, world)
+    assert component.reference == 3 and component.world_from_scan is place
+    assert component.poses[3].angle_deg() == 0.0
+
+
+@pytest.mark.parametrize("num_anchors", [8, 40])
+def test_a_start_pose_is_marked_unless_the_search_finds_it_too(num_anchors: int):
+    """The pose of a search that finds it is its own; in no case is there a second one near it."""
+    pair = creature_pair(80)
+    config = PairsConfig(num_anchors=num_anchors, num_turns=8, num_survivors=(5 * num_anchors, 5))
+    first, second = (even_anchors(field, num_anchors) for field in pair.fields)
+    sets = [(first, second)]
+    start = pair.i_from_j @ turn_about_centre(1.0)
+    alone, result = (
+        register_pair(0, 1, *pair.fields, sets, pair.diameter, config, None, given_pose)
+        for given_pose in (None, start)
+    )
+    found = [option for option in alone.alternatives if pair.off_by(option.i_from_j)[0] < 5]
+    right = [option for option in result.alternatives if pair.off_by(option.i_from_j)[0] < 5]
+    assert len(right) == 1 and right[0] is result.best
+    assert len(found) == (0 if num_anchors == 8 else 1)
+    assert right[0].is_given is not bool(found)
+    assert not any(option.is_given for option in alone.alternatives)

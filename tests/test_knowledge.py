@@ -1,0 +1,419 @@
+"""Users' knowledge: it helps where it is right, is refused and named where it is not."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scanweld import pipeline
+from scanweld.app.outputs import report_json
+from scanweld.app.summary import summary
+from scanweld.config import Config, FusionConfig, PairsConfig, PrepareConfig
+from scanweld.errors import KnowledgeError
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import PoseSet, write_poses
+from scanweld.knowledge import Knowledge, read_knowledge
+from scanweld.progress import Cache
+from scanweld.reconstruction import FactVerdict, Reconstruction, Verdict
+from tests.scenes import MILD_NOISE, Scene, scene_of, small_creature, view_of
+
+CONFIG = Config(
+    prepare=PrepareConfig(num_samples=500),
+    pairs=PairsConfig(keypoints="even", num_anchors=40, num_turns=18, num_survivors=(600, 60)),
+    fusion=FusionConfig(max_voxels_across=60),
+)
+HASTY = CONFIG.model_copy(
+    update={
+        "pairs": PairsConfig(keypoints="even", num_anchors=8, num_turns=8, num_survivors=(20, 5))
+    }
+)
+"""A search so small that it misses pairs of thin overlap."""
+FIRST, SECOND = "scan_01", "scan_02"
+THIN = (20, 122)
+"""Azimuths of a pair that alone is good by little."""
+TOO_THIN = (300, 42)
+"""Azimuths of a pair with the right pose first and too low a score."""
+OPPOSITE = (110, 215)
+"""Azimuths of a pair whose best pose is wrong, and contradicted."""
+
+
+class Memory:
+    """A cache."""
+
+    def __init__(self) -> None:
+        self.kept: dict[str, object] = {}
+
+    def get(self, key: str) -> object | None:
+        return self.kept.get(key)
+
+    def put(self, key: str, value: object) -> None:
+        self.kept[key] = value
+
+
+SHARED = Memory()
+"""Pairs do not depend on knowledge other than start poses: they are registered once."""
+
+
+@lru_cache
+def seen_from(*azimuths: float, tilted: float | None = None, noisy: bool = False) -> Scene:
+    """The creature on a turntable, each scan in a random frame; one more from above, if tilted."""
+    mesh = small_creature()
+    views = [view_of(mesh, azimuth, 10, pixels=160) for azimuth in azimuths]
+    if tilted is not None:
+        views.append(view_of(mesh, tilted, 50, pixels=160))
+    return scene_of(mesh, views, seed=5, noise=MILD_NOISE if noisy else None)
+
+
+def run(
+    scans: Sequence[RangeScan],
+    knowledge: Knowledge | None = None,
+    config: Config = CONFIG,
+    cache: Cache | None = None,
+    workers: int = 1,
+) -> Reconstruction:
+    cache = SHARED if cache is None else cache
+    return pipeline.run(scans, config, knowledge=knowledge, cache=cache, workers=workers)
+
+
+def poses_of(scene: Scene, off: Mapping[str, Pose] | None = None) -> PoseSet:
+    """The true poses of a scene in a frame of their own, some moved away from the truth."""
+    world = Pose.exp([0.3, -0.2, 1.0, 40.0, 5.0, -30.0])
+    poses = {
+        name: world @ (off or {}).get(name, Pose.identity()) @ pose
+        for name, pose in scene.world_from_scan.items()
+    }
+    return PoseSet(poses=poses, components=(tuple(poses),))
+
+
+def off_by(result: Reconstruction, scene: Scene, a: str, b: str) -> tuple[float, float]:
+    """Error of the pose of b relative to a: degrees, and shift of b's middle in diameters."""
+    found = result.poses[a].inverse() @ result.poses[b]
+    true = scene.world_from_scan[a].inverse() @ scene.world_from_scan[b]
+    scan = next(scan for scan in scene.scans if scan.name == b)
+    apart = true.inverse() @ found
+    return apart.angle_deg(), apart.shift_at(np.mean(scan.points, axis=0)) / 210.0
+
+
+def assert_right(result: Reconstruction, scene: Scene, a: str = FIRST, b: str = SECOND) -> None:
+    angle, shift = off_by(result, scene, a, b)
+    assert angle < 3 and shift < 0.015
+
+
+def verdicts(result: Reconstruction) -> dict[str, FactVerdict]:
+    return {fact.fact: fact.verdict for fact in result.knowledge}
+
+
+def reason_of(result: Reconstruction, fact: str) -> str:
+    return next(f.reason for f in result.knowledge if f.fact == fact)
+
+
+def poses_bytes(result: Reconstruction) -> list[bytes]:
+    return [pose.matrix().tobytes() for _, pose in sorted(result.poses.items())]
+
+
+# -- start poses --------------------------------------------------------------------------------
+
+
+def test_a_right_start_rescues_a_pair_that_the_search_misses():
+    scene = seen_from(*THIN)
+    alone = run(scene.scans, config=HASTY)
+    assert alone.verdict is Verdict.NOTHING
+    result = run(scene.scans, Knowledge(start=poses_of(scene)), HASTY)
+    assert result.verdict is Verdict.GOOD
+    assert_right(result, scene)
+    assert verdicts(result) == {"start poses": FactVerdict.HELD}
+
+
+def test_a_right_start_rescues_a_pair_that_the_published_method_gets_wrong():
+    scene, paper = seen_from(42, 100), CONFIG.model_copy(update={"method": "paper"})
+    assert run(scene.scans, config=paper).verdict is Verdict.NOTHING
+    upside_down = poses_of(scene, {SECOND: Pose.exp([np.pi, 0, 0, 0, 0, 0])})
+    assert run(scene.scans, Knowledge(start=upside_down), paper).verdict is Verdict.NOTHING
+    result = run(scene.scans, Knowledge(start=poses_of(scene)), paper)
+    assert result.verdict is Verdict.GOOD
+    assert_right(result, scene)
+
+
+def test_a_rough_start_is_refined():
+    """10 deg and a few percent off: the evidence is that of the refined pose."""
+    scene = seen_from(*THIN)
+    rough = {SECOND: Pose.exp([0, 0, np.radians(8.0), 2.0, -2.0, 1.0])}
+    result = run(scene.scans, Knowledge(start=poses_of(scene, rough)), HASTY)
+    assert_right(result, scene)
+
+
+def test_a_wrong_start_is_not_believed():
+    scene = seen_from(*THIN)
+    wrong = poses_of(scene, {SECOND: Pose.exp([0, 0, 1.2, 20, 0, 0])})
+    result = run(scene.scans, Knowledge(start=wrong), HASTY)
+    assert result.verdict is Verdict.NOTHING and not result.poses
+    assert verdicts(result) == {"start poses": FactVerdict.OPEN}
+
+
+def test_a_wrong_start_changes_nothing_and_is_named():
+    scene = seen_from(42, 100, 150)
+    alone = run(scene.scans)
+    wrong = poses_of(scene, {"scan_03": Pose.exp([0, 0, 1.2, 20, 0, 0])})
+    result = run(scene.scans, Knowledge(start=wrong))
+    assert alone.verdict is Verdict.GOOD and result.verdict is Verdict.DOUBTFUL
+    assert poses_bytes(result) == poses_bytes(alone)
+    assert verdicts(result) == {"start poses": FactVerdict.CONTRADICTED}
+    reason = reason_of(result, "start poses")
+    assert "2 of 3" in reason and "wrong: scan_03 is 6" in reason
+    assert any(reason in told for told in result.reasons)
+
+
+@pytest.mark.parametrize("wrong", [("scan_03",), ("scan_02",), ("scan_02", "scan_04")])
+def test_wrong_starts_are_named_and_no_others_even_where_the_reference_is_one(
+    wrong: tuple[str, ...],
+):
+    scene = seen_from(42, 100, 150, 200)
+    aside = [Pose.exp([0, 0, turn, 20, 0, 0]) for turn in (1.2, -0.9)]
+    start = poses_of(scene, dict(zip(wrong, aside, strict=False)))
+    result = run(scene.scans, Knowledge(start=start))
+    assert result.components[0][0] == "scan_02" and len(result.poses) == 4
+    reason = reason_of(result, "start poses")
+    assert f"{4 - len(wrong)} of 4" in reason
+    assert [scan.name for scan in scene.scans if f"{scan.name} is" in reason] == list(wrong)
+
+
+def test_work_with_a_start_is_not_taken_for_work_without():
+    scene, memory = seen_from(*THIN), Memory()
+    assert not run(scene.scans, None, HASTY, memory).poses
+    assert run(scene.scans, Knowledge(start=poses_of(scene)), HASTY, memory).poses
+    assert not run(scene.scans, Knowledge(turntable=True), HASTY, memory).poses
+
+
+# -- fixed scans --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [FIRST, SECOND])
+def test_the_frame_of_a_fixed_scan_is_the_world(name: str):
+    scene = seen_from(42, 100)
+    result = run(scene.scans, Knowledge(fix=(name,)))
+    assert result.components[0][0] == name
+    assert np.array_equal(result.poses[name].matrix(), np.eye(4))
+    assert result.verdict is Verdict.GOOD and verdicts(result) == {f"fix {name}": FactVerdict.HELD}
+    assert_right(result, scene)
+
+
+def test_a_fixed_scan_stays_at_its_start_pose_and_the_model_with_it():
+    scene = seen_from(42, 100)
+    start = poses_of(scene)
+    result = run(scene.scans, Knowledge(fix=(SECOND,), start=start))
+    assert np.array_equal(result.poses[SECOND].matrix(), start.poses[SECOND].matrix())
+    assert_right(result, scene)
+    assert result.mesh is not None
+    points = start.poses[SECOND].apply(scene.scans[1].points)
+    apart = np.linalg.norm(result.mesh.vertices.mean(axis=0) - points.mean(axis=0))
+    assert apart < 0.2 * 210
+
+
+def test_two_fixed_scans_that_cannot_both_stay_are_named():
+    """Both frames are said to be the world; but the frames are drawn at random."""
+    scene = seen_from(42, 100)
+    result = run(scene.scans, Knowledge(fix=(SECOND, FIRST)))
+    assert verdicts(result) == {
+        f"fix {SECOND}": FactVerdict.HELD,
+        f"fix {FIRST}": FactVerdict.CONTRADICTED,
+    }
+    assert result.verdict is Verdict.DOUBTFUL
+    agreed = run(scene.scans, Knowledge(fix=(SECOND, FIRST), start=poses_of(scene)))
+    assert set(verdicts(agreed).values()) == {FactVerdict.HELD}
+    assert agreed.verdict is Verdict.GOOD
+
+
+# -- together -----------------------------------------------------------------------------------
+
+
+def test_together_lets_a_pair_through_that_is_just_refused():
+    scene = seen_from(*TOO_THIN)
+    alone = run(scene.scans)
+    assert alone.verdict is Verdict.NOTHING
+    assert "below" in alone.pairs[0].reason
+    result = run(scene.scans, Knowledge(together=((SECOND, FIRST),)))
+    assert result.verdict is Verdict.GOOD
+    assert_right(result, scene)
+    assert "said to be together" in result.pairs[0].reason and result.pairs[0].accepted
+    assert verdicts(result) == {f"together {FIRST} {SECOND}": FactVerdict.HELD}
+
+
+def test_together_lets_no_contradicted_pair_through():
+    scene = seen_from(*OPPOSITE)
+    result = run(scene.scans, Knowledge(together=((FIRST, SECOND),)))
+    assert result.verdict is Verdict.NOTHING and not result.poses
+    assert verdicts(result) == {f"together {FIRST} {SECOND}": FactVerdict.CONTRADICTED}
+    assert "saw through" in result.reasons[1]
+
+
+def test_scans_together_that_are_placed_far_from_each_other_are_named():
+    scene = seen_from(42, 100, 150, 200)
+    result = run(scene.scans, Knowledge(together=((FIRST, "scan_04"), (FIRST, SECOND))))
+    assert len(result.poses) == 4 and result.verdict is Verdict.DOUBTFUL
+    assert list(verdicts(result).values()) == [FactVerdict.CONTRADICTED, FactVerdict.HELD]
+
+
+# -- apart --------------------------------------------------------------------------------------
+
+
+@lru_cache
+def twins() -> tuple[RangeScan, ...]:
+    """Two scans each of two objects that look alike: by the scans alone they are one."""
+    one, other = seen_from(42, 100, noisy=True), seen_from(44, 103, noisy=True)
+    names = ("a1", "a2", "b1", "b2")
+    scans = (*one.scans, *other.scans)
+    return tuple(replace(scan, name=name) for scan, name in zip(scans, names, strict=True))
+
+
+def test_apart_keeps_two_objects_apart_that_look_alike():
+    assert len(run(twins()).components) == 1
+    apart = tuple((a, b) for a in ("a1", "a2") for b in ("b1", "b2"))
+    result = run(twins(), Knowledge(apart=apart))
+    assert sorted(sorted(c) for c in result.components) == [["a1", "a2"], ["b1", "b2"]]
+    assert result.verdict is not Verdict.GOOD
+    assert "good pair" in reason_of(result, "apart a1 b1")
+    for pair in result.pairs:
+        is_across = pair.i[0] != pair.j[0]
+        assert pair.accepted is not is_across
+        assert not is_across or pair.reason == "said to be apart"
+
+
+def test_no_merge_lays_scans_onto_each_other_that_are_apart():
+    """Only a1 and b1 are apart; through a2 or b2 they would come to lie on each other."""
+    result = run(twins(), Knowledge(apart=(("b1", "a1"),)))
+    homes = [set(c) for c in result.components]
+    assert homes and all(not {"a1", "b1"} <= home for home in homes)
+
+
+def test_apart_holds_where_nothing_lays_the_scans_together():
+    scene = seen_from(42, 100, 150, 200)
+    result = run(scene.scans, Knowledge(apart=((FIRST, "scan_04"),)))
+    assert len(result.components[0]) == 4 and result.verdict is Verdict.GOOD
+    assert verdicts(result) == {f"apart {FIRST} scan_04": FactVerdict.HELD}
+
+
+# -- turntable ----------------------------------------------------------------------------------
+
+
+def test_a_turntable_supports_a_thin_pair():
+    scene = seen_from(42, 100, 150, 300)
+    assert set(run(scene.scans).unplaced) == {"scan_04"}
+    result = run(scene.scans, Knowledge(turntable=True))
+    assert result.verdict is Verdict.GOOD and len(result.poses) == 4
+    for scan in scene.scans[1:]:
+        assert_right(result, scene, FIRST, scan.name)
+    assert verdicts(result) == {"turntable": FactVerdict.HELD}
+    assert "3 good pairs turn about one axis to within 0." in reason_of(result, "turntable")
+
+
+def test_a_scan_off_the_axis_is_refused_and_named():
+    """From above it has as many good pairs as the others have among themselves."""
+    scene = seen_from(42, 100, 150, tilted=70)
+    assert len(run(scene.scans).poses) == 4
+    result = run(scene.scans, Knowledge(turntable=True))
+    assert set(result.unplaced) == {"scan_04"}
+    assert "off the turntable's axis by 4" in result.unplaced["scan_04"]
+    assert verdicts(result) == {"turntable": FactVerdict.CONTRADICTED}
+    assert reason_of(result, "turntable").count("scan_04") == 3
+    assert result.verdict is Verdict.DOUBTFUL
+
+
+def test_two_scans_say_nothing_of_an_axis():
+    scene = seen_from(42, 100)
+    result = run(scene.scans, Knowledge(turntable=True))
+    assert result.verdict is Verdict.GOOD
+    assert verdicts(result) == {"turntable": FactVerdict.OPEN}
+
+
+# -- of all of it -------------------------------------------------------------------------------
+
+
+def test_knowing_nothing_changes_nothing():
+    scene = seen_from(42, 100)
+    with_none, with_empty = run(scene.scans), run(scene.scans, Knowledge())
+    assert poses_bytes(with_none) == poses_bytes(with_empty)
+    assert "knowledge" not in report_json(with_empty)
+
+
+def test_order_and_workers_do_not_change_a_byte():
+    scene = seen_from(42, 100, 150, 300)
+    known = Knowledge(
+        fix=(SECOND,),
+        start=poses_of(scene, {"scan_03": Pose.exp([0, 0, 1.2, 20, 0, 0])}),
+        together=((FIRST, "scan_04"),),
+        apart=(("scan_04", SECOND),),
+        turntable=True,
+    )
+    result = run(scene.scans, known, cache=Memory())
+    again = run(scene.scans[::-1], known, cache=Memory(), workers=2)
+    assert poses_bytes(result) == poses_bytes(again)
+    assert result.knowledge == again.knowledge and result.reasons == again.reasons
+
+
+def test_facts_are_in_the_report_and_the_summary():
+    scene = seen_from(42, 100)
+    result = run(scene.scans, Knowledge(fix=(FIRST,), turntable=True))
+    told = json.loads(json.dumps(report_json(result)["knowledge"]))
+    assert [set(fact) for fact in told] == [{"fact", "verdict", "reason"}] * 2
+    assert told[0]["verdict"] == "held" and told[1]["verdict"] == "open"
+    lines = summary(result, Path("model")).splitlines()
+    assert any(line.startswith(f"  held fix {FIRST}: ") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("known", "told"),
+    [
+        (Knowledge(fix=("nobody",)), "fix: no scan is called nobody; there are scan_01"),
+        (Knowledge(together=((FIRST, "nobody"),)), "together: no scan is called nobody"),
+        (Knowledge(apart=(("nobody", FIRST),)), "apart: no scan is called nobody"),
+        (
+            Knowledge(start=PoseSet(poses={"x": Pose.identity()}, components=(("x",),))),
+            "start: has a pose for none of the scans",
+        ),
+    ],
+)
+def test_facts_about_no_scan_are_errors(known: Knowledge, told: str):
+    with pytest.raises(KnowledgeError, match=told):
+        run(seen_from(42, 100).scans, known)
+
+
+def test_facts_that_deny_each_other_are_errors():
+    with pytest.raises(KnowledgeError, match="a and b are said to be both together and apart"):
+        Knowledge(together=(("a", "b"),), apart=(("b", "a"),))
+    with pytest.raises(KnowledgeError, match="a is named twice"):
+        Knowledge(apart=(("a", "a"),))
+
+
+def test_facts_from_a_file(tmp_path: Path):
+    poses = PoseSet(poses={"a": Pose.identity()}, components=(("a",),))
+    write_poses(tmp_path / "poses.json", poses)
+    file = tmp_path / "facts.json"
+    told = {"fix": ["a"], "start": "poses.json", "together": [["b", "a"]], "turntable": True}
+    file.write_text(json.dumps(told))
+    known = read_knowledge(file)
+    assert known.fix == ("a",) and known.together == (("a", "b"),) and known.turntable
+    assert known.start is not None and set(known.start.poses) == {"a"}
+    more = known.joined(Knowledge(fix=("c",), apart=(("a", "c"),)))
+    assert more.fix == ("a", "c") and more.start is known.start and more.apart == (("a", "c"),)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("{", "cannot be read as JSON"),
+        ('{"turn_table": true}', "turn_table"),
+        ('{"together": [["a"]]}', "together"),
+        ("[]", "the file"),
+    ],
+)
+def test_files_that_are_no_facts_are_named(tmp_path: Path, text: str, told: str):
+    file = tmp_path / "facts.json"
+    file.write_text(text)
+    with pytest.raises(KnowledgeError, match=told) as raised:
+        read_knowledge(file)
+    assert str(file) in str(raised.value) and "\n" not in str(raised.value)
