@@ -17,6 +17,7 @@ from benchmarks.paper.study import Study, read_records
 from benchmarks.paper.tables import table, table_names
 from scanweld.config import Config
 from scanweld.errors import InputError
+from scanweld.multiview import turntable
 from scanweld.multiview.explain import OUTWEIGHED
 from scanweld.multiview.refine_graph import MAX_SCORE_LOSS
 from scanweld.pairs import register
@@ -148,6 +149,10 @@ def test_report_page_gives_the_limits_of_the_code():
         f"agree < {MIN_AGREE:g}",
         f"more than {register.RIVAL_ANGLE_DEG:g} degrees or "
         f"{100 * register.RIVAL_SHIFT_DIAMETERS:g} % of the diameter away",
+        f"The limits of a distinct pose are {register.RIVAL_ANGLE_DEG:g} degrees and "
+        f"{100 * register.RIVAL_SHIFT_DIAMETERS:g} % of the diameter",
+        f"turn by more than {turntable.MIN_TURN_DEG:g} degrees",
+        f"agree on less than {MIN_AGREE:g}",
         f"more than {MAX_SCORE_LOSS:g} of their mean score",
         f"less than {'twice' if OUTWEIGHED == 2 else OUTWEIGHED} that pair's",
         f"up to `prepare.num_samples` ({config.prepare.num_samples})",
