@@ -9,10 +9,10 @@ import numpy as np
 import trimesh
 
 from scanweld.evaluation.creature import creature
-from scanweld.evaluation.primitives import box, cylinder, plate, sphere
+from scanweld.evaluation.primitives import box, cylinder, lathe, plate, sphere
 from scanweld.evaluation.views import Axis
 from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.mesh import TriangleMesh, compact
+from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.io import read_mesh
 from sets import data_folder
@@ -85,32 +85,6 @@ def joined(mesh: TriangleMesh, vertices: FloatArray, faces: IntArray) -> Triangl
         vertices=np.concatenate([mesh.vertices, vertices]),
         faces=np.concatenate([mesh.faces, faces + len(mesh.vertices)]),
     )
-
-
-def lathe(
-    profile: Callable[[FloatArray, FloatArray], FloatArray], height: float = 100.0
-) -> TriangleMesh:
-    """A closed solid about the z axis: its radius by turn (radians) and level (0 to 1)."""
-    num_turns, num_levels = 360, 161
-    turn = 2 * np.pi * np.arange(num_turns) / num_turns
-    level = np.linspace(0.0, 1.0, num_levels)
-    radius = profile(*np.meshgrid(turn, level))
-    ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    side = np.concatenate(
-        [radius[..., None] * ring, np.broadcast_to(level[:, None, None], (*radius.shape, 1))], 2
-    )
-    side[..., 2] *= height
-    vertices = np.concatenate([side.reshape(-1, 3), [[0, 0, 0], [0, 0, height]]])
-    k = np.arange(num_levels * num_turns).reshape(num_levels, num_turns)
-    a, b = k[:-1], np.roll(k[:-1], -1, axis=1)
-    c, d = k[1:], np.roll(k[1:], -1, axis=1)
-    bottom, top = len(vertices) - 2, len(vertices) - 1
-    faces = [np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, d), (a, d, c))]
-    first, last = k[0], k[-1]
-    faces.append(np.stack([np.full_like(first, bottom), np.roll(first, -1), first], axis=-1))
-    faces.append(np.stack([np.full_like(last, top), last, np.roll(last, -1)], axis=-1))
-    vertices, used, _ = compact(vertices, np.concatenate(faces))
-    return TriangleMesh(vertices=vertices, faces=used)
 
 
 def vase_radius(turn: FloatArray, level: FloatArray) -> FloatArray:

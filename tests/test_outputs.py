@@ -58,7 +58,7 @@ def test_poses(tmp_path: Path, result: Reconstruction):
 
 def test_graph(result: Reconstruction):
     pairs = graph_json(result)["pairs"]
-    keys = "i j kind accepted reason i_from_j score overlap evidence margin observability"
+    keys = "i j kind accepted reason i_from_j score overlap evidence margin observability sliding"
     for pair in pairs:
         assert set(pair) == {*keys.split(), "alternatives"}
     assert [(pair["i"], pair["j"]) for pair in pairs] == [

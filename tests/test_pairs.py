@@ -15,7 +15,8 @@ from scanweld.heat.features import Features, describe
 from scanweld.pairs.anchors import even_anchors, pair_anchors
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
-from scanweld.pairs.icp import IcpSchedule, icp, information_of
+from scanweld.pairs.icp import IcpSchedule, icp
+from scanweld.pairs.information import information_of
 from scanweld.pairs.register import register_pair, to_pose
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.visibility import pose_rows
@@ -155,8 +156,8 @@ def test_information_is_symmetric_and_positive(gap: float):
     eigenvalues = np.linalg.eigvalsh(information)
     assert eigenvalues[0] > 0
     assert creature_result(gap).observability == pytest.approx(eigenvalues[0] / eigenvalues[-1])
-    # Directions are unit vectors: the translation block of each match has trace 1.
-    assert np.trace(information[3:, 3:]) == pytest.approx(1.0)
+    # Directions are unit vectors: the translation block of each match has trace 1, less noise.
+    assert 0.97 < np.trace(information[3:, 3:]) < 1.0
 
 
 def test_information_does_not_depend_on_the_frame_of_the_pair():
@@ -164,9 +165,8 @@ def test_information_does_not_depend_on_the_frame_of_the_pair():
     pair = creature_pair(60)
     spectra = []
     for each in (pair, swapped(pair)):
-        row = pose_rows([each.i_from_j])[0]
         radius = 0.012 * pair.diameter
-        information, rms, count = information_of(*each.fields, row, radius, pair.diameter)
+        information, rms, count = information_of(*each.fields, each.i_from_j, radius, pair.diameter)
         assert count > 200 and rms < radius
         spectra.append(np.linalg.eigvalsh(information))
     np.testing.assert_allclose(spectra[0], spectra[1], rtol=0.02)

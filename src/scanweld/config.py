@@ -89,8 +89,9 @@ class PairsConfig(Section):
     which a pair is not accepted on its own: wrong poses often agree widely, but not cleanly."""
     min_margin: float = Field(default=0.4, ge=0, le=1)
     """Share of the score by which the best pose must beat its best distinct rival."""
-    min_observability: float = Field(default=5e-4, ge=0)
-    """Smallest over largest eigenvalue of the information matrix below which a pose slides."""
+    min_observability: float = Field(default=2.5e-4, ge=0)
+    """Smallest over largest eigenvalue of the information that noise cannot feign, below which a
+    pose slides."""
 
 
 class CoarseConfig(Section):

@@ -195,6 +195,7 @@ def _pair_report(
         evidence=None if chosen is None else chosen.evidence,
         margin=result.margin,
         observability=result.observability,
+        sliding=None if result.sliding is None else result.sliding.slide,
         alternatives=tuple(
             AlternativeReport(i_from_j=between_scans(option.i_from_j), score=option.score)
             for option in result.alternatives

@@ -9,6 +9,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import Viewpoint
 from scanweld.pairs.result import Evidence, PairKind
+from scanweld.pairs.slippage import Slide
 
 
 class Verdict(StrEnum):
@@ -95,6 +96,7 @@ class PairReport:
         evidence: Its evidence; None where nothing fits.
         margin: Share of the score by which it beats the best distinct rival.
         observability: Smallest over largest eigenvalue of its information.
+        sliding: What the surfaces slide like on each other, if the pair is a sliding one.
         alternatives: All distinct poses kept, best first.
     """
 
@@ -109,6 +111,7 @@ class PairReport:
     evidence: Evidence | None
     margin: float
     observability: float
+    sliding: Slide | None = None
     alternatives: tuple[AlternativeReport, ...] = ()
 
 

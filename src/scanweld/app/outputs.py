@@ -70,6 +70,7 @@ def _pair(pair: PairReport) -> Json:
         "evidence": None if pair.evidence is None else asdict(pair.evidence),
         "margin": pair.margin,
         "observability": pair.observability,
+        "sliding": pair.sliding,
         "alternatives": [
             {"i_from_j": _matrix(other.i_from_j), "score": other.score}
             for other in pair.alternatives

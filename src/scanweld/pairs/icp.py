@@ -61,35 +61,6 @@ def icp(
     return refined
 
 
-def information_of(
-    i: ScanField, j: ScanField, pose: FloatArray, radius: float, diameter: float
-) -> tuple[FloatArray, float, int]:
-    """Point-to-plane information (6, 6) per match, residual rms and number of matches of a pose.
-
-    Rotation comes before translation, about the middle of the matches; rotations are multiplied
-    by 3 / diameter, so that all entries compare.
-
-    Args:
-        i: First scan.
-        j: Second scan.
-        pose: (12,) row of i_from_j.
-        radius: Farthest match, in the scans' unit.
-        diameter: Diameter of the run.
-    """
-    h, g, sums = np.zeros((6, 6)), np.zeros(6), np.zeros(5)
-    _accumulate_both(
-        *_source(i), *_target(i), *_source(j), *_target(j),
-        pose, radius, len(i.points), np.zeros(3), 3.0 / diameter, h, g, sums,
-    )  # fmt: skip
-    count = int(sums[0])
-    if count < MIN_MATCHES:
-        return np.zeros((6, 6)), float("nan"), count
-    x, y, z = sums[2:] / count * (3.0 / diameter)
-    to_middle = np.eye(6)
-    to_middle[:3, 3:] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return to_middle @ h @ to_middle.T / count, float(np.sqrt(sums[1] / count)), count
-
-
 def _source(field: ScanField) -> tuple[FloatArray, FloatArray]:
     return field.points, field.normals
 
@@ -117,7 +88,7 @@ def _refine_all(
     turn_scale: float,
 ) -> None:
     """Refine the pose rows (N, 12) in place, turning about the middle of both scans."""
-    h, g, sums, centre = np.zeros((6, 6)), np.zeros(6), np.zeros(5), np.zeros(3)
+    h, g, centre = np.zeros((6, 6)), np.zeros(6), np.zeros(3)
     for p in range(poses.shape[0]):
         pose = poses[p]
         for radius in radii:
@@ -126,12 +97,12 @@ def _refine_all(
                 for k in range(3):
                     moved += pose[3 * r + k] * middle[3 + k]
                 centre[r] = 0.5 * (middle[r] + moved)
-            _accumulate_both(
+            count = _accumulate_both(
                 points_i, normals_i, surface_i, closest_i, origin_i,
                 points_j, normals_j, surface_j, closest_j, origin_j,
-                pose, radius, num_samples, centre, turn_scale, h, g, sums,
+                pose, radius, num_samples, centre, turn_scale, h, g,
             )  # fmt: skip
-            if sums[0] < MIN_MATCHES or not solve_damped(h, g):
+            if count < MIN_MATCHES or not solve_damped(h, g):
                 break
             move(pose, g, centre, turn_scale)
 
@@ -155,12 +126,10 @@ def _accumulate_both(
     turn_scale: float,
     h: FloatArray,
     g: FloatArray,
-    sums: FloatArray,
-) -> None:
-    """Normal equations h x = -g of both directions; sums: matches, squared residuals, points."""
+) -> int:
+    """Normal equations h x = -g of both directions, and the number of matches."""
     h[:] = 0.0
     g[:] = 0.0
-    sums[:] = 0.0
     back = np.empty(12)
     for r in range(3):
         back[9 + r] = 0.0
@@ -168,10 +137,11 @@ def _accumulate_both(
             back[3 * r + k] = pose[3 * k + r]
             back[9 + r] -= pose[3 * k + r] * pose[9 + k]
     same = np.array([1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0, 0, 0, 0])
-    _accumulate(points_j, normals_j, pose, same, surface_i, closest_i, origin_i, 1.0,
-                radius, num_samples, centre, turn_scale, h, g, sums)  # fmt: skip
-    _accumulate(points_i, normals_i, back, pose, surface_j, closest_j, origin_j, -1.0,
-                radius, num_samples, centre, turn_scale, h, g, sums)  # fmt: skip
+    count = _accumulate(points_j, normals_j, pose, same, surface_i, closest_i, origin_i, 1.0,
+                        radius, num_samples, centre, turn_scale, h, g)  # fmt: skip
+    count += _accumulate(points_i, normals_i, back, pose, surface_j, closest_j, origin_j, -1.0,
+                        radius, num_samples, centre, turn_scale, h, g)  # fmt: skip
+    return count
 
 
 @njit(cache=True, nogil=True)
@@ -190,11 +160,14 @@ def _accumulate(
     turn_scale: float,
     h: FloatArray,
     g: FloatArray,
-    sums: FloatArray,
-) -> None:
-    """Point-to-plane terms of one direction; sign is -1 where the plane moves, not the point."""
+) -> int:
+    """Point-to-plane terms of one direction, and how many matches they are of.
+
+    The sign is -1 where the plane moves, not the point.
+    """
     a, b, edge = target_from_source, i_from_target, origin[3]
     q, m, n, jac = np.empty(3), np.empty(3), np.empty(3), np.empty(6)
+    count = 0
     for s in range(min(num_samples, points.shape[0])):
         p, o = points[s], normals[s]
         for r in range(3):
@@ -229,7 +202,5 @@ def _accumulate(
             g[r] += jac[r] * residual
             for k in range(6):
                 h[r, k] += jac[r] * jac[k]
-        sums[0] += 1.0
-        sums[1] += residual * residual
-        for r in range(3):
-            sums[2 + r] += m[r]
+        count += 1
+    return count

@@ -11,7 +11,8 @@ from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
-from scanweld.pairs.icp import IcpSchedule, icp, information_of
+from scanweld.pairs.icp import IcpSchedule, icp
+from scanweld.pairs.information import information_of
 from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult
 from scanweld.pairs.verdict import classify_pair
 from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
@@ -219,8 +220,8 @@ def result_of(
     information, rms = np.zeros((6, 6)), float("nan")
     if alternatives:
         radius = config.tolerance_diameters[2] * diameter
-        (row,) = pose_rows([alternatives[0].i_from_j])
-        information, rms, _ = information_of(field_i, field_j, row, radius, diameter)
+        pose = alternatives[0].i_from_j
+        information, rms, _ = information_of(field_i, field_j, pose, radius, diameter)
     return classify_pair(i, j, alternatives, information, rms, config)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
+from scanweld.pairs.slippage import Slippage
 
 VIOLATION_WEIGHT = 3.0
 """How much more a sample says that the other sensor contradicts than one that agrees."""
@@ -104,9 +105,10 @@ class PairResult:
         kind: Kind of the pair.
         reason: Why it is not good, in words; empty where it is.
         alternatives: Distinct poses, best first; none where nothing fits at all.
-        information: (6, 6) point-to-plane information of the best pose about the matches'
-            centroid, rotation then translation, per match and rotations scaled by 3 / diameter.
-        observability: Smallest over largest eigenvalue of the information.
+        information: (6, 6) point-to-plane information of the best pose, as ``information_of``
+            gives it.
+        observability: Smallest over largest eigenvalue of the information; 0 if that is negative.
+        sliding: Which motion is free, where the pair is a sliding one.
         margin: Share of the best score by which it beats its best distinct rival; 1 without rival.
         rms: Point-to-plane residual of the best pose's matches, in the scans' unit; NaN if none.
     """
@@ -120,6 +122,7 @@ class PairResult:
     observability: float
     margin: float
     rms: float
+    sliding: Slippage | None = None
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

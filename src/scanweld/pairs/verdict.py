@@ -5,6 +5,7 @@ import numpy as np
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.result import Alternative, PairKind, PairResult, margin_over
+from scanweld.pairs.slippage import Slippage, slippage_of
 
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
@@ -24,7 +25,7 @@ def classify_pair(
         i: Index of the first scan,
         j: of the second, i < j.
         alternatives: Distinct poses between the sensor frames, best first.
-        information: (6, 6) information of the best pose, rotations scaled.
+        information: (6, 6) information of the best pose.
         rms: Residual of the best pose, in the scans' unit; NaN if there is none.
         config: Settings.
     """
@@ -34,7 +35,8 @@ def classify_pair(
     )
     scores = [alternative.score for alternative in alternatives]
     margin = margin_over(scores[0], scores[1:]) if scores else 0.0
-    kind, reason = _kind(alternatives, observability, margin, config)
+    sliding = slippage_of(information, config.min_observability)
+    kind, reason = _kind(alternatives, sliding, margin, config)
     return PairResult(
         i=i,
         j=j,
@@ -45,6 +47,7 @@ def classify_pair(
         observability=observability,
         margin=margin,
         rms=rms,
+        sliding=sliding if kind is PairKind.SLIDING else None,
     )
 
 
@@ -64,7 +67,10 @@ def no_pose(i: int, j: int, reason: str) -> PairResult:
 
 
 def _kind(
-    alternatives: tuple[Alternative, ...], observability: float, margin: float, config: PairsConfig
+    alternatives: tuple[Alternative, ...],
+    sliding: Slippage | None,
+    margin: float,
+    config: PairsConfig,
 ) -> tuple[PairKind, str]:
     if not alternatives or alternatives[0].evidence.agree < MIN_AGREE:
         return PairKind.NO_OVERLAP, "no pose makes the scans overlap"
@@ -75,11 +81,8 @@ def _kind(
     if best.score < config.min_score:
         told = f"score {best.score:.2f} below {config.min_score:.2f}"
         return PairKind.NO_OVERLAP, f"too little overlap to be sure: {told}"
-    if observability < config.min_observability:
-        return (
-            PairKind.SLIDING,
-            f"the surfaces slide on each other: observability {observability:.1e}",
-        )
+    if sliding is not None:
+        return PairKind.SLIDING, f"the surfaces slide on each other {sliding.words}"
     if margin < config.min_margin:
         return PairKind.AMBIGUOUS, f"another pose explains the scans as well: margin {margin:.2f}"
     return PairKind.GOOD, ""

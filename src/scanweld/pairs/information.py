@@ -1,0 +1,70 @@
+"""How firmly a pair's matches hold its pose: point-to-plane information that noise cannot feign.
+
+The information of a match with normal n is J J^T, J = (x cross n, n). Where surfaces slide on each
+other, J is orthogonal to the slide, but for the noise of n, which squared looks like information.
+Each match has two normals, one of each scan, with errors of their own: of the product J_a J_b^T
+of both, only what they have in common is left.
+"""
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.field import ScanField
+from scanweld.pairs.icp import MIN_AGREEMENT, MIN_MATCHES
+
+NUM_DEVIATIONS = 6.0
+"""Standard deviations by which information must exceed what noise leaves of itself. They are those
+of independent matches; normals are smoothed, so that neighbours have errors in common."""
+TURN_SCALE = 3.0
+"""Rotations are multiplied by this over the diameter, so that they compare with translations."""
+
+
+def information_of(
+    i: ScanField, j: ScanField, i_from_j: Pose, radius: float, diameter: float
+) -> tuple[FloatArray, float, int]:
+    """Information (6, 6) per match that both scans vouch for, residual rms and number of matches.
+
+    It is C - 6 N / sqrt(m), with C the mean of (J_a J_b^T + J_b J_a^T) / 2 over the m matches, and
+    N that of (J_a - J_b) (J_a - J_b)^T / 2, which noise gives. An eigenvalue may be negative.
+    Rotation comes before translation, about the middle of the matches, in the axes of i; rotations
+    are multiplied by 3 / diameter, so that all entries compare.
+
+    Args:
+        i: First scan.
+        j: Second scan.
+        i_from_j: The pose between the sensor frames.
+        radius: Farthest match, in the scans' unit.
+        diameter: Diameter of the run.
+    """
+    forward, backward = _matches(j, i, i_from_j, radius), _matches(i, j, i_from_j.inverse(), radius)
+    points = np.concatenate([forward[0], i_from_j.apply(backward[0])])
+    one = np.concatenate([forward[1], i_from_j.turn(backward[1])])
+    other = np.concatenate([forward[2], i_from_j.turn(backward[2])])
+    residuals = np.concatenate([forward[3], backward[3]])
+    count = len(points)
+    if count < MIN_MATCHES:
+        return np.zeros((6, 6)), float("nan"), count
+    away = (points - points.mean(axis=0)) * (TURN_SCALE / diameter)
+    a, b = (np.column_stack([np.cross(away, normals), normals]) for normals in (one, other))
+    common = (a.T @ b + b.T @ a) / (2 * count)
+    noise = (a - b).T @ (a - b) / (2 * count)
+    information = common - NUM_DEVIATIONS / np.sqrt(count) * noise
+    return information, float(np.sqrt(np.mean(residuals**2))), count
+
+
+def _matches(
+    source: ScanField, target: ScanField, target_from_source: Pose, radius: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Samples of the source on the target, both normals (N, 3) and the distance, target frame."""
+    points = target_from_source.apply(source.points)
+    normals = target_from_source.turn(source.normals)
+    cell = np.floor((points - target.origin[:3]) / target.origin[3] + 0.5).astype(np.int64)
+    inside = ((cell >= 0) & (cell < target.closest.shape)).all(axis=1)
+    points, normals, cell = points[inside], normals[inside], cell[inside]
+    hit = target.surface[target.closest[tuple(cell.T)]]
+    away = points - hit[:, :3]
+    kept = (hit[:, 6] != 0) & ((away**2).sum(axis=1) <= radius**2)
+    kept &= (normals * hit[:, 3:6]).sum(axis=1) >= MIN_AGREEMENT
+    residuals = (away * hit[:, 3:6]).sum(axis=1)
+    return points[kept], normals[kept], hit[kept, 3:6], residuals[kept]
