@@ -2,27 +2,25 @@
 
     python benchmarks/pages.py
 
-``make benchmarks`` measures first. A part stands between <!-- begin: NAME --> and <!-- end -->;
-what it says comes from the JSON alone, so that no figure is typed by hand.
+``make benchmarks`` measures first. What a part says comes from the JSON alone, so that no figure is
+typed by hand.
 """
 
-import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import mean
 from typing import Any
 
+import blocks
 import keypoints
 import pairs
 import run
-import stress
 from results import DATA, read_results
 from scanweld.io.atomic import write_whole
 
 ROOT = Path(__file__).parents[1]
 PAGES = (ROOT / "README.md", ROOT / "docs/benchmarks.md")
-BLOCK = re.compile(r"(<!-- begin: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 USAGE_ERROR = 2
 IN_WORDS = {
     "bunny10": "Stanford bunny, 10 real scans",
@@ -58,7 +56,7 @@ def rewritten(text: str) -> str:
     Raises:
         FileNotFoundError: If there are no results for one of them.
     """
-    return BLOCK.sub(lambda found: found[1] + block(found[2]) + found[3], text)
+    return blocks.rewritten(text, block)
 
 
 def block(name: str) -> str:
@@ -145,17 +143,12 @@ def _keypoints(records: Records) -> str:
     return "\n".join(keypoints.table(records)) + "\n"
 
 
-def _stress(runs: Records) -> str:
-    return "\n".join(stress.table(list(runs))) + "\n"
-
-
 BLOCKS: dict[str, tuple[str, Callable[[Records], str]]] = {
     "sets-in-words": ("sets", _sets_in_words),
     "sets": ("sets", _sets),
     "pairs-in-words": ("pairs", _pairs_in_words),
     "pairs": ("pairs", _pairs),
     "keypoints": ("keypoints", _keypoints),
-    "stress": ("stress", _stress),
 }
 """Part of a page -> its results in docs/data, and what says them in Markdown."""
 

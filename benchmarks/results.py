@@ -23,12 +23,17 @@ def write_results(path: Path, records: Sequence[dict[str, Any]]) -> None:
         "format": 2,
         "command": shlex.join(["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]]),
         "version": version("scanweld"),
-        "machine": f"{os.cpu_count()} cores, Python {platform.python_version()}",
+        "machine": machine(),
     }
     lines = ",\n".join(json.dumps(_rounded(record)) for record in records)
     path.parent.mkdir(parents=True, exist_ok=True)
     text = f'{json.dumps(head, indent=1)[:-2]},\n "records": [\n{lines}\n]}}\n'
     write_whole(path, text.encode())
+
+
+def machine() -> str:
+    """What measured, in words."""
+    return f"{os.cpu_count()} cores, Python {platform.python_version()}"
 
 
 def read_results(path: Path) -> dict[str, Any]:

@@ -84,11 +84,6 @@ def _sets(results: Results, standing: str) -> str:
     return f"{count} of {total}" if standing == "right" else str(count)
 
 
-def _stress_placed(results: Results) -> str:
-    runs = results.data("stress")
-    return str(sum(scan["verdict"] == "good" for run in runs for scan in run["scans"].values()))
-
-
 def _heat_hypotheses(results: Results) -> str:
     keypoints = mean(record["keypoints"] for record in results.data("keypoints"))
     return f"{keypoints**2 * Config().pairs.num_turns:,.0f}"
@@ -237,8 +232,6 @@ NUMBERS: dict[str, Callable[[Results], str]] = {
     "least-observability": _least_observability,
     "sets-right": partial(_sets, standing="right"),
     "sets-wrong": partial(_sets, standing="wrong"),
-    "stress-wrong": lambda results: str(sum(run["wrong"] for run in results.data("stress"))),
-    "stress-placed": _stress_placed,
     "m-icc-converged-simple": partial(_converged, method="m-icc", simple=True),
     "m-icc-converged-complex": partial(_converged, method="m-icc", simple=False),
     "mm-icc-converged-simple": partial(_converged, method="mm-icc", simple=True),

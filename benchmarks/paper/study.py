@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
+from benchmarks.results import machine
 from scanweld.errors import ScanweldError
 from scanweld.io.atomic import write_whole
 
@@ -19,7 +20,7 @@ Result = Mapping[str, Any]
 """What was measured: the same."""
 
 _ROOT = Path(__file__).parents[2]
-_MEASURING = (
+MEASURING = (
     "src/scanweld/**/*.py",
     *(
         "benchmarks/paper/views.py",
@@ -70,6 +71,7 @@ class Study:
         workers: Processes.
         quick: Whether a handful of units will do.
         command: What the user typed, for the JSON.
+        code: Patterns of the files that measure: units that other code measured do not count.
     """
 
     out: Path
@@ -77,6 +79,7 @@ class Study:
     workers: int
     quick: bool
     command: str
+    code: tuple[str, ...] = MEASURING
 
     def records(self, table: Table, advance: Callable[[int, int], None]) -> list[Record]:
         """Measure what is not measured yet; the records come in the order of the units.
@@ -90,7 +93,7 @@ class Study:
             RuntimeError: If a unit fails. The finished ones are kept.
         """
         units = table.units(self.quick)
-        code = _code_digest(table)
+        code = self._code_digest(table)
         keys = [_key(code, table, unit) for unit in units]
         store = self.work / f"{table.NAME}.jsonl"
         results = _stored(store)
@@ -110,13 +113,25 @@ class Study:
             "format": 1,
             "table": table.NAME,
             "command": self.command,
-            "code": _code_digest(table),
+            "machine": machine(),
+            "code": self._code_digest(table),
             "records": [{**record.unit, "result": record.result} for record in records],
         }
         path = self.out / "data" / f"{table.NAME}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
         lines = json.dumps(_rounded(document), separators=(",", ":")).replace('},{"', '},\n{"')
         write_whole(path, (lines + "\n").encode())
+
+    def _code_digest(self, table: Table) -> str:
+        """Of the code that measures: results of other code are not taken for this one's."""
+        own = f"benchmarks/paper/{table.NAME}.py", f"benchmarks/paper/{table.NAME}/*.py"
+        paths = {path for pattern in (*self.code, *own) for path in _ROOT.glob(pattern)}
+        digest = hashlib.sha256()
+        for path in sorted(paths):
+            name = path.relative_to(_ROOT).as_posix()
+            if not name.startswith(_NOT_MEASURING):
+                digest.update(name.encode() + path.read_bytes())
+        return digest.hexdigest()[:16]
 
     def _measured(
         self, table: Table, waiting: Sequence[tuple[str, Unit]]
@@ -162,18 +177,6 @@ def _result_of(future: "Future[Result]", table: Table, unit: Unit) -> Result:
 def _key(code: str, table: Table, unit: Unit) -> str:
     told = json.dumps([code, table.NAME, unit], sort_keys=True)
     return hashlib.sha256(told.encode()).hexdigest()
-
-
-def _code_digest(table: Table) -> str:
-    """Of the code that measures: results of other code are not taken for this one's."""
-    own = f"benchmarks/paper/{table.NAME}.py", f"benchmarks/paper/{table.NAME}/*.py"
-    paths = {path for pattern in (*_MEASURING, *own) for path in _ROOT.glob(pattern)}
-    digest = hashlib.sha256()
-    for path in sorted(paths):
-        name = path.relative_to(_ROOT).as_posix()
-        if not name.startswith(_NOT_MEASURING):
-            digest.update(name.encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _stored(path: Path) -> dict[str, Result]:

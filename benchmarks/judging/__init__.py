@@ -1,0 +1,1 @@
+"""What the main job says of virtual scans, held against the truth."""

@@ -1,0 +1,203 @@
+"""A scene: scans under neutral names in random frames, and the truth about them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from benchmarks.virtual.bodies import Body, make_body
+from benchmarks.virtual.disturbances import Disturbance
+from benchmarks.virtual.shots import SLIGHT, Shot, Taking, Views, is_chain, take_shots
+from benchmarks.virtual.strangers import Strangers
+from scanweld.evaluation.metrics import object_diameter, scan_centroids
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.views import View
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.geometry.rasterize import render_depth
+from scanweld.geometry.scan import RangeScan, principal_diameter
+
+CHAIN_OVERLAP = 0.2
+"""Pairs of neighbours overlap by at least this share."""
+MAX_DRAWS = 60
+MARK_PIXELS = 25
+"""A scan that shows a mark shows so many pixels of it, another one next to none."""
+HIDDEN_PIXELS = 3
+MIN_MARKED = 2
+"""Scans that show it."""
+
+
+class Group(StrEnum):
+    """What is asked of a scenario."""
+
+    CLEAN = "clean"
+    HARD = "hard"
+    CROP = "crop"
+    SCALE = "scale"
+    SYMMETRIC = "symmetric"
+    REPORTED = "reported"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Scenario:
+    """How to make the scans of a run.
+
+    Attributes:
+        group: What is asked of it.
+        seeds: How many runs.
+        body: Name of the object.
+        views: Where it is scanned from.
+        taking: What else is in front of the sensor.
+        noise: What the sensor does to depth.
+        crop: What is cut off the scans.
+        disturbances: What happens to the scans after that, one after the other.
+        strangers: Scans that are added.
+        min_overlap: Of the pairs that connect all scans of the object; views are drawn anew until
+            this holds.
+        spoils_first: Whether the first scan is not to be placed, so that the others have to be
+            connected without it.
+    """
+
+    group: Group
+    seeds: int
+    body: str = "thing"
+    views: Views
+    taking: Taking = take_shots
+    noise: NoiseModel = SLIGHT
+    crop: Disturbance | None = None
+    disturbances: tuple[Disturbance, ...] = ()
+    strangers: Strangers | None = None
+    min_overlap: float = CHAIN_OVERLAP
+    spoils_first: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Scene:
+    """What the main job is given, and what it should find.
+
+    Attributes:
+        scans: In random frames, under neutral names.
+        truth: world_from_scan of all that belong somewhere.
+        worlds: Number of each scan's world; a second object has one of its own.
+        sources: What each scan was made from, in words.
+        factors: Scale of the scans whose scale is wrong.
+        is_open: Scans whose pose nothing that they show determines: those of symmetric objects,
+            and those that do not see the one mark.
+        symmetry: Motions of the world that leave the object as it is.
+        diameter: Of the object, or of what a crop left of it.
+        centroids: Of each scan, in its frame.
+    """
+
+    scans: list[RangeScan]
+    truth: dict[str, Pose]
+    worlds: dict[str, int]
+    sources: dict[str, str]
+    factors: dict[str, float]
+    is_open: frozenset[str]
+    symmetry: tuple[Pose, ...]
+    diameter: float
+    centroids: dict[str, FloatArray]
+
+
+def make_scene(scenario: Scenario, seed: int) -> Scene:
+    """The scans of a scenario; those of the same object and views differ in nothing else.
+
+    Raises:
+        ValueError: If no draw of the views gives the overlap that is asked for.
+    """
+    body = make_body(scenario.body, seed)
+    for draw in range(MAX_DRAWS):
+        views = scenario.views(body, np.random.default_rng([seed, 0, draw]))
+        bare = _cropped(scenario, take_shots(body, views, SLIGHT, seed), seed, draw)
+        if is_chain(bare[scenario.spoils_first :], scenario.min_overlap) and _shows(body, views):
+            break
+    else:
+        raise ValueError(f"no views of the {scenario.body} overlap enough, seed {seed}")
+    shots = scenario.taking(body, views, scenario.noise, seed)
+    if body.unmarked is not None:
+        seen = mark_pixels(body, views)
+        shots = [replace(s, sees_mark=n >= MARK_PIXELS) for s, n in zip(shots, seen, strict=True)]
+    shots = _cropped(scenario, shots, seed, draw)
+    rng = np.random.default_rng([seed, 1])
+    for disturb in scenario.disturbances:
+        shots = disturb(shots, rng)
+    if scenario.strangers:
+        shots = shots + scenario.strangers(seed, rng)
+    return _posed(shots, body, _diameter(body, bare), seed)
+
+
+def mark_pixels(body: Body, views: Sequence[View]) -> list[int]:
+    """Pixels of each view that show the mark: those that are elsewhere without it."""
+    assert body.unmarked is not None
+    counts = []
+    for view in views:
+        sensor_from_world = view.world_from_sensor.inverse()
+        with_mark, without = (
+            render_depth(sensor_from_world.apply(mesh.vertices), mesh.faces, view.camera)[0]
+            for mesh in (body.mesh, body.unmarked)
+        )
+        near = np.abs(with_mark - without) <= view.camera.footprint(float(np.nanmedian(without)))
+        neither = np.isnan(with_mark) & np.isnan(without)
+        counts.append(int((~near & ~neither).sum()))
+    return counts
+
+
+def _shows(body: Body, views: Sequence[View]) -> bool:
+    """Whether the mark is there to see, where there is one, and no view sees half of it."""
+    if body.unmarked is None:
+        return True
+    counts = np.array(mark_pixels(body, views))
+    shown = counts >= MARK_PIXELS
+    return int(shown.sum()) >= MIN_MARKED and bool((shown | (counts <= HIDDEN_PIXELS)).all())
+
+
+def _cropped(scenario: Scenario, shots: list[Shot], seed: int, draw: int) -> list[Shot]:
+    if scenario.crop is None:
+        return shots
+    return scenario.crop(shots, np.random.default_rng([seed, 3, draw]))
+
+
+def _diameter(body: Body, bare: Sequence[Shot]) -> float:
+    """Of the object, or of what is left of it in the scans."""
+    truth = {s.scan.name: s.world_from_sensor for s in bare if s.world_from_sensor is not None}
+    left = object_diameter([shot.scan for shot in bare], truth)
+    return min(left, principal_diameter(body.mesh.vertices))
+
+
+def _posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scene:
+    """Shuffle, rename, and move every scan into a random frame."""
+    rng = np.random.default_rng([seed, 2])
+    of: dict[str, Shot] = {}
+    scans: list[RangeScan] = []
+    truth: dict[str, Pose] = {}
+    for number, k in enumerate(rng.permutation(len(shots)), start=1):
+        shot, name = shots[k], f"scan_{number:02d}"
+        motion = Pose(
+            rotation=random_rotation(rng),
+            translation=rng.uniform(-2 * diameter, 2 * diameter, size=3),
+        )
+        sensor = shot.scan.scan_from_sensor
+        scans.append(
+            replace(
+                shot.scan,
+                name=name,
+                points=motion.apply(shot.scan.points),
+                scan_from_sensor=None if sensor is None else motion @ sensor,
+            )
+        )
+        of[name] = shot
+        if shot.world_from_sensor is not None:
+            truth[name] = shot.world_from_sensor @ motion.inverse()
+    is_open = {n for n, s in of.items() if (body.symmetry or not s.sees_mark) and s.world == 0}
+    return Scene(
+        scans=scans,
+        truth=truth,
+        worlds={name: shot.world for name, shot in of.items()},
+        sources={name: shot.scan.name for name, shot in of.items()},
+        factors={name: shot.factor for name, shot in of.items() if shot.factor != 1.0},
+        is_open=frozenset(is_open & set(truth)),
+        symmetry=body.symmetry,
+        diameter=diameter,
+        centroids=scan_centroids(scans),
+    )
