@@ -396,7 +396,7 @@ def test_a_scan_without_a_grid_gives_the_same_surface(keeps: str):
     scan = prepare(bare, CONFIG)
     assert scan.diameter == pytest.approx(whole.diameter, rel=0.03)
     off = depths_at(scan, whole.samples.points)
-    assert np.isfinite(off).mean() > 0.97
+    assert np.isfinite(off).mean() > 0.95
     assert np.nanmedian(np.abs(off)) < scan.image.pixel
     nearest = KDTree(whole.samples.points).query(scan.samples.points)[1]
     turn = angles_deg(scan.samples.normals, whole.samples.normals[nearest])

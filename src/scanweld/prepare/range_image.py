@@ -17,6 +17,7 @@ from scanweld.geometry.mesh import (
 from scanweld.geometry.prepared import RangeImage
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import RangeScan
+from scanweld.prepare.denoise import clean_depth, has_gaps
 from scanweld.prepare.silhouette import classify_pixels
 
 MARGIN_DIAMETERS = 0.05
@@ -25,6 +26,10 @@ MIN_PIECE_SHARE = 0.002
 """Pieces of fewer pixels than this share of the surface's are no surface."""
 MAX_EDGE_PIXELS = 4.0
 """Points farther apart than this across the line of sight are not joined."""
+COARSE_PIXELS = 80
+"""A scan with faces and fewer points across its diameter is rendered finer than its points,"""
+SUBDIVIDED_PIXELS = 160
+"""with as many pixels, at least: else the rims would take most of its surface."""
 POINT_PIXELS = 1.6
 """Pixel of bare points, in spacings: smaller ones would leave most of the surface empty."""
 NORMAL_SMOOTHING_ROUNDS = 2
@@ -49,21 +54,25 @@ def make_range_image(
         surface pixels in row-major order, faces and smoothed normals look to the sensor.
     """
     organised = scan.grid is not None or scan.faces is not None
-    pixel = max(resolution * (1.0 if organised else POINT_PIXELS), diameter / config.image_pixels)
+    spacing = max(resolution * (1.0 if organised else POINT_PIXELS), diameter / config.image_pixels)
+    pixel = _pixel_size(spacing, diameter, config) if organised else spacing
     margin = (config.closing_diameters + MARGIN_DIAMETERS) * diameter
     camera = working_camera(scan, points, pixel, margin)
-    faces = _scan_faces(scan, points, pixel, config)
+    faces = _scan_faces(scan, points, spacing, config)
     if faces is not None:
         depth, _ = render_depth(points, faces, camera)
         # Points that lost returns have cut off from every face are surface too: without them the
-        # silhouette shrinks, and right poses seem to lie in free space.
+        # silhouette shrinks, and right poses seem to lie in free space. Where many returns are
+        # lost the faces that are left leave most of the surface out.
         is_lonely = np.ones(len(points), dtype=bool)
-        is_lonely[faces] = False
+        if not has_gaps(depth):
+            is_lonely[faces] = False
         depth = np.where(np.isfinite(depth), depth, _splat(points[is_lonely], camera))
     else:
         depth = _splat(points, camera)
     for _ in range(PINHOLE_ROUNDS):
         depth = _fill_pinholes(depth, config.jump_pixels * pixel)
+    depth = clean_depth(depth, pixel, config.jump_pixels * pixel)
     depth, mesh = _surface(depth, camera, pixel, config)
     kind, outside = classify_pixels(
         np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
@@ -78,6 +87,13 @@ def make_range_image(
         pixel=pixel,
     )
     return image, mesh
+
+
+def _pixel_size(spacing: float, diameter: float, config: PrepareConfig) -> float:
+    """Footprint of a pixel: the points' spacing, or a whole part of it where that is coarse."""
+    if spacing * min(COARSE_PIXELS, config.image_pixels) <= diameter:
+        return spacing
+    return float(spacing / np.ceil(spacing * SUBDIVIDED_PIXELS / diameter))
 
 
 def working_camera(scan: RangeScan, points: FloatArray, pixel: float, margin: float) -> Camera:
@@ -109,13 +125,13 @@ def working_camera(scan: RangeScan, points: FloatArray, pixel: float, margin: fl
 
 
 def _scan_faces(
-    scan: RangeScan, points: FloatArray, pixel: float, config: PrepareConfig
+    scan: RangeScan, points: FloatArray, spacing: float, config: PrepareConfig
 ) -> IntArray | None:
     """Triangles (F, 3) between the scan's points; None for bare points."""
     if scan.grid is None:
         return scan.faces
-    max_step = config.jump_pixels * pixel
-    return grid_faces(scan.grid, points, points[:, 2], max_step, MAX_EDGE_PIXELS * pixel)
+    max_step = config.jump_pixels * spacing
+    return grid_faces(scan.grid, points, points[:, 2], max_step, MAX_EDGE_PIXELS * spacing)
 
 
 def _splat(points: FloatArray, camera: Camera) -> FloatArray:
