@@ -33,6 +33,8 @@ HASTY = CONFIG.model_copy(
     }
 )
 """A search so small that it misses pairs of thin overlap."""
+THOROUGH = CONFIG.model_copy(update={"prepare": PrepareConfig(num_samples=1500)})
+"""Samples enough to tell a pair of thin overlap from one that slides."""
 FIRST, SECOND = "scan_01", "scan_02"
 THIN = (20, 122)
 """Azimuths of a pair that alone is good by little."""
@@ -302,13 +304,13 @@ def test_apart_holds_where_nothing_lays_the_scans_together():
 
 def test_a_turntable_supports_a_thin_pair():
     scene = seen_from(42, 100, 150, 300)
-    assert set(run(scene.scans).unplaced) == {"scan_04"}
-    result = run(scene.scans, Knowledge(turntable=True))
+    assert set(run(scene.scans, None, THOROUGH).unplaced) == {"scan_04"}
+    result = run(scene.scans, Knowledge(turntable=True), THOROUGH)
     assert result.verdict is Verdict.GOOD and len(result.poses) == 4
     for scan in scene.scans[1:]:
         assert_right(result, scene, FIRST, scan.name)
     assert verdicts(result) == {"turntable": FactVerdict.HELD}
-    assert "3 good pairs turn about one axis to within 0." in reason_of(result, "turntable")
+    assert "2 good pairs turn about one axis to within 0." in reason_of(result, "turntable")
 
 
 def test_a_scan_off_the_axis_is_refused_and_named():
