@@ -40,6 +40,8 @@ class PrepareConfig(Section):
     """Width of the rim along jumps, holes and the silhouette."""
     min_cosine: float = Field(default=0.15, ge=0, lt=1)
     """Cosine between normal and viewing ray below which a place is too oblique for a sample."""
+    support: Literal["left out", "kept"] = "left out"
+    """What becomes of the table that the object stands on, where most scans show one."""
     num_samples: int = Field(default=800, ge=100)
     """Oriented samples of a scan, at most."""
 

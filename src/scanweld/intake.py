@@ -12,13 +12,15 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.knowledge import Knowledge
 from scanweld.multiview.given import Given
-from scanweld.prepare import prepare
+from scanweld.prepare import prepare, stands_on_support
 from scanweld.stages import Stages
 
 logger = logging.getLogger(__name__)
 
 MAX_SIZE_RATIO = 6.0
 """A scan this many times larger or smaller than the others is in another unit, or not of it."""
+MOST = 0.6
+"""Share of the scans that must show a table: a plane in a few of them is the object's own."""
 UNIT_RATIOS = {
     1000.0: "m and mm",
     100.0: "m and cm",
@@ -72,12 +74,13 @@ def take_in(
         kept = _without_duplicates(scans, refused)
         kept = _of_one_size(kept, refused)
         outcomes = stages.each("prepare", lambda scan: _try_prepare(scan, config), kept)
-        prepared = []
-        for scan, outcome in zip(kept, outcomes, strict=True):
-            if isinstance(outcome, str):
-                refused[scan.name] = outcome
-            else:
-                prepared.append(outcome)
+        prepared = _usable(kept, outcomes, refused)
+        standing = {scan.name for scan in prepared if stands_on_support(scan)}
+        if config.prepare.support == "left out" and len(standing) >= MOST * len(prepared):
+            outcomes = stages.each(
+                "prepare", lambda scan: _try_prepare(scan, config, scan.name in standing), kept
+            )
+            prepared = _usable(kept, outcomes, refused)
         counts["scans"] = len(prepared)
         counts["refused"] = len(refused)
     if len(prepared) < 2:
@@ -130,8 +133,22 @@ def _unit_hint(ratio: float) -> str:
     return f"; units mixed up ({UNIT_RATIOS[closest]})? Give all scans in one unit"
 
 
-def _try_prepare(scan: RangeScan, config: Config) -> PreparedScan | str:
+def _usable(
+    scans: Sequence[RangeScan], outcomes: Sequence[PreparedScan | str], refused: dict[str, str]
+) -> list[PreparedScan]:
+    prepared = []
+    for scan, outcome in zip(scans, outcomes, strict=True):
+        if isinstance(outcome, str):
+            refused[scan.name] = outcome
+        else:
+            prepared.append(outcome)
+    return prepared
+
+
+def _try_prepare(
+    scan: RangeScan, config: Config, without_support: bool = False
+) -> PreparedScan | str:
     try:
-        return prepare(scan, config.prepare)
+        return prepare(scan, config.prepare, without_support=without_support)
     except InputError as error:
         return str(error).removeprefix(f"{scan.name}: ")

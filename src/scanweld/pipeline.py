@@ -115,7 +115,7 @@ def _register_pairs(
     )
 
     def key(edge: Edge) -> str:
-        hashes = [intake.prepared[k].content_hash for k in edge]
+        hashes = [intake.prepared[k].work_hash for k in edge]
         settings = (config.prepare, config.heat, config.pairs, config.contours, config.refine)
         start = intake.given.start_key(edge)
         return work_key("pair", *hashes, intake.diameter, *settings, *start)

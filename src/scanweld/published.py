@@ -85,7 +85,7 @@ def _register_pairs(
         return judge_pose(i, j, fields[i], fields[j], i_from_j, intake.diameter, config.pairs)
 
     def key(edge: Edge) -> str:
-        hashes = [prepared[k].content_hash for k in edge]
+        hashes = [prepared[k].work_hash for k in edge]
         settings = (config.prepare, config.heat, config.coarse, config.contours, config.pairs)
         start = intake.given.start_key(edge)
         return work_key("published pair", *hashes, intake.diameter, *settings, *start)

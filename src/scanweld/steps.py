@@ -38,7 +38,7 @@ def describe_scans(intake: Intake, config: Config, stages: Stages) -> list[Featu
             "features",
             lambda scan: describe(scan, config.heat),
             intake.prepared,
-            lambda scan: work_key("features", scan.content_hash, config.prepare, config.heat),
+            lambda scan: work_key("features", scan.work_hash, config.prepare, config.heat),
         )
         counts["keypoints"] = sum(len(f.points) for f in found)
     return found

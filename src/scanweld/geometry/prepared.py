@@ -89,6 +89,7 @@ class PreparedScan:
         resolution: Median spacing of neighbouring points of the scan.
         diameter: Diagonal of the scan's box along its principal axes, strays removed.
         content_hash: Of the scan; orders scans and pairs, whatever their files are called.
+        is_without_support: Whether the plane that the object stands on was left out.
     """
 
     scan: RangeScan
@@ -98,11 +99,17 @@ class PreparedScan:
     resolution: float
     diameter: float
     content_hash: str
+    is_without_support: bool = False
 
     @property
     def scan_from_sensor(self) -> Pose:
         """Where the sensor stood: given, fitted or estimated."""
         return self.scan.sensor_pose
+
+    @property
+    def work_hash(self) -> str:
+        """Of the scan and of what was left out of it: what work on it is kept by."""
+        return f"{self.content_hash}{' without support' * self.is_without_support}"
 
     @property
     def name(self) -> str:

@@ -1,5 +1,7 @@
 """Scan -> prepared scan: sensor located, rendered into a range image, sampled evenly."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from scanweld.config import PrepareConfig
@@ -11,13 +13,21 @@ from scanweld.prepare.resolution import point_spacing
 from scanweld.prepare.sampling import farthest_points
 from scanweld.prepare.sensor import locate_sensor
 from scanweld.prepare.strays import without_strays
+from scanweld.prepare.support import find_support
 
 MIN_SURFACE_PIXELS = 200
 MIN_SAMPLES = 50
 
 
-def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
+def prepare(
+    scan: RangeScan, config: PrepareConfig, *, without_support: bool = False
+) -> PreparedScan:
     """Make a scan ready for registration.
+
+    Args:
+        scan: Any scan.
+        config: Settings.
+        without_support: Whether the plane that the object stands on, if any, is left out.
 
     Raises:
         InputError: If the scan shows too little surface to be registered.
@@ -26,8 +36,13 @@ def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
     sensor_from_scan = located.sensor_pose.inverse()
     resolution = point_spacing(located.points)
     clean = without_strays(located, sensor_from_scan.apply(located.points), resolution)
-    diameter = principal_diameter(clean.points)
     points = sensor_from_scan.apply(clean.points)
+    support = find_support(points, resolution) if without_support else None
+    if support is not None:
+        note = f"the flat support under the object is left out: {support.sum()} points"
+        located = replace(located, notes=(*located.notes, note))
+        clean, points = clean.only(~support), points[~support]
+    diameter = principal_diameter(points)
     image, mesh = make_range_image(clean, points, resolution, diameter, config)
     samples = take_samples(image, config)
     if len(mesh.vertices) < MIN_SURFACE_PIXELS or len(samples.points) < MIN_SAMPLES:
@@ -43,7 +58,14 @@ def prepare(scan: RangeScan, config: PrepareConfig) -> PreparedScan:
         resolution=resolution,
         diameter=diameter,
         content_hash=scan.content_hash(),
+        is_without_support=support is not None,
     )
+
+
+def stands_on_support(scan: PreparedScan) -> bool:
+    """Whether a scan shows the plane that the object stands on."""
+    points = scan.image.points()
+    return find_support(points[np.isfinite(scan.image.depth)], scan.image.pixel) is not None
 
 
 def take_samples(image: RangeImage, config: PrepareConfig) -> Samples:

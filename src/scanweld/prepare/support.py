@@ -1,0 +1,101 @@
+"""The table or turntable that an object stands on: a plane around it, with the object above it.
+
+A plane says nothing of how an object is turned on it, and it may be another one once the object
+has been turned over. So it is left out before scans are registered.
+"""
+
+import numpy as np
+
+from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.scan import principal_diameter
+
+NUM_DRAWS = 300
+"""Planes through three points that are tried."""
+NUM_TRIED = 2000
+"""Points that they are tried on, at most."""
+FLAT_SPACINGS = 1.5
+"""Points this near a plane lie in it, in spacings of the points,"""
+FLAT_DEVIATIONS = 4.0
+"""or in standard deviations of those in it."""
+MIN_SHARE = 0.15
+"""Share of the points that the plane holds, at least."""
+MIN_ABOVE, MAX_BELOW = 0.03, 0.3
+"""Least share of the points that stand above it; most below, as a share of these."""
+MIN_HEIGHT = 0.15
+"""What stands on it is at least so high, in its own diameters: reliefs are of one piece."""
+NUM_SECTORS, MIN_SECTORS = 12, 8
+"""Sectors around the object, and in how many of them, at least, the plane is seen beyond it."""
+REACH = 0.6
+"""It is, where it reaches so far, as a share of how far the object does there."""
+
+
+def find_support(points: FloatArray, spacing: float) -> BoolArray | None:
+    """Points of the plane that an object stands on, and of what is below it.
+
+    Args:
+        points: (N, 3), sensor frame.
+        spacing: Of the points.
+
+    Returns:
+        (N,) which points belong to it, or None where there is no such plane.
+    """
+    plane = _main_plane(points, FLAT_SPACINGS * spacing)
+    if plane is None:
+        return None
+    normal, offset = plane
+    height = points @ normal - offset
+    within = np.abs(height) <= FLAT_SPACINGS * spacing
+    deviation = float(np.sqrt(np.mean(height[within] ** 2)))
+    reach = max(FLAT_SPACINGS * spacing, FLAT_DEVIATIONS * deviation)
+    is_above = height > reach
+    num_below = int((height < -reach).sum())
+    if (
+        is_above.mean() < MIN_ABOVE
+        or num_below > MAX_BELOW * is_above.sum()
+        or (~is_above).mean() < MIN_SHARE
+        or np.quantile(height[is_above], 0.95) < MIN_HEIGHT * principal_diameter(points[is_above])
+        or not _surrounds(points[~is_above], points[is_above], normal)
+    ):
+        return None
+    return ~is_above
+
+
+def _main_plane(points: FloatArray, reach: float) -> tuple[FloatArray, float] | None:
+    """Unit normal, towards the sensor, and offset of the plane that holds most points."""
+    rng = np.random.default_rng(0)
+    tried = points[rng.permutation(len(points))[:NUM_TRIED]]
+    a, b, c = (tried[rng.integers(len(tried), size=NUM_DRAWS)] for _ in range(3))
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    real = length > 0
+    if not real.any():
+        return None
+    normals = normals[real] / length[real, None]
+    offsets = (normals * a[real]).sum(axis=1)
+    counts = (np.abs(tried @ normals.T - offsets) <= reach).sum(axis=0)
+    best = int(np.argmax(counts))
+    if counts[best] < MIN_SHARE * len(tried):
+        return None
+    normal, offset = normals[best], float(offsets[best])
+    for _ in range(3):
+        held = tried[np.abs(tried @ normal - offset) <= reach]
+        middle = held.mean(axis=0)
+        normal = np.linalg.svd(held - middle, full_matrices=False)[2][2]
+        offset = float(normal @ middle)
+    return (normal, offset) if normal[2] < 0 else (-normal, -offset)
+
+
+def _surrounds(plane: FloatArray, above: FloatArray, normal: FloatArray) -> bool:
+    """Whether the plane's points are seen beyond what stands on it, on most sides."""
+    across = np.linalg.svd(normal[None])[2][1:].T
+    middle = (above @ across).mean(axis=0)
+    sides = []
+    for points in (plane, above):
+        flat = points @ across - middle
+        sector = ((np.arctan2(flat[:, 1], flat[:, 0]) / (2 * np.pi) + 0.5) * NUM_SECTORS).astype(
+            np.int64
+        )
+        reach = np.zeros(NUM_SECTORS)
+        np.maximum.at(reach, np.minimum(sector, NUM_SECTORS - 1), np.linalg.norm(flat, axis=1))
+        sides.append(reach)
+    return int((sides[0] >= REACH * sides[1]).sum()) >= MIN_SECTORS

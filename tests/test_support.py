@@ -1,0 +1,132 @@
+"""The table under an object: found and left out where there is one, and nothing else is."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from scanweld.config import Config, PrepareConfig
+from scanweld.evaluation.scanner import NoiseModel, scan_mesh
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.scan import RangeScan
+from scanweld.intake import Intake, take_in
+from scanweld.knowledge import Knowledge
+from scanweld.prepare import prepare, stands_on_support
+from scanweld.prepare.support import find_support
+from scanweld.progress import NoCache, silent
+from scanweld.stages import Stages
+from tests.scenes import small_creature
+
+NOISE = NoiseModel(depth_diameters=2e-4)
+
+
+def joined(*meshes: TriangleMesh) -> TriangleMesh:
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return TriangleMesh(
+        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
+        faces=np.concatenate([mesh.faces + k for mesh, k in zip(meshes, starts[:-1], strict=True)]),
+    )
+
+
+def slab(mesh: TriangleMesh, width: float, thickness: float = 2.0) -> TriangleMesh:
+    """A square slab of a width, in diameters of the mesh, under it."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    side = width * float(np.linalg.norm(high - low))
+    box = trimesh.creation.box((side, side, thickness))
+    place = np.array([*0.5 * (low + high)[:2], low[2] - 0.5 * thickness])
+    return TriangleMesh(vertices=box.vertices + place, faces=box.faces)
+
+
+def seen(mesh: TriangleMesh, azimuth_deg: float, elevation_deg: float = 30.0) -> RangeScan:
+    view = view_of(mesh, azimuth_deg, elevation_deg, 20.0, pixels=180.0)
+    name = f"at {azimuth_deg:.0f}"
+    return scan_mesh(mesh, view.camera, view.world_from_sensor, NOISE, 1, name=name)
+
+
+def on_table(width: float = 1.6) -> TriangleMesh:
+    mesh = small_creature()
+    return joined(mesh, slab(mesh, width))
+
+
+def solid(made: trimesh.Trimesh) -> TriangleMesh:
+    return TriangleMesh(vertices=made.vertices, faces=made.faces)
+
+
+def taken_in(scans: list[RangeScan], config: Config | None = None) -> Intake:
+    stages = Stages(workers=1, cache=NoCache(), progress=silent)
+    return take_in(scans, {}, Knowledge(), config or Config(), stages)
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, 130.0, 250.0])
+def test_what_is_left_out_is_the_table_and_nothing_else(azimuth_deg: float):
+    mesh = small_creature()
+    view = view_of(on_table(), azimuth_deg, 30.0, 20.0, pixels=180.0)
+    scan = scan_mesh(on_table(), view.camera, view.world_from_sensor, NOISE, 1)
+    assert stands_on_support(prepare(scan, PrepareConfig()))
+    spacing = prepare(scan, PrepareConfig()).resolution
+    left_out = find_support(scan.points, spacing)
+    assert left_out is not None
+    height = view.world_from_sensor.apply(scan.points)[:, 2] - mesh.vertices[:, 2].min()
+    assert left_out[height < 0.5 * spacing].all()
+    assert not left_out[height > 3.0 * spacing].any()
+
+
+def test_the_prepared_scan_shows_the_object_alone():
+    alone = prepare(seen(small_creature(), 0.0), PrepareConfig())
+    scan = prepare(seen(on_table(), 0.0), PrepareConfig(), without_support=True)
+    assert scan.diameter == pytest.approx(alone.diameter, rel=0.1)
+    assert scan.is_without_support and "support" in scan.scan.notes[-1]
+    assert not stands_on_support(scan)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        small_creature(),
+        solid(trimesh.creation.box((60, 40, 30))),
+        solid(trimesh.creation.icosphere(subdivisions=4, radius=40)),
+        solid(trimesh.creation.cylinder(radius=30, height=60)),
+        joined(
+            solid(trimesh.creation.box((100, 70, 6))),
+            solid(trimesh.creation.cylinder(radius=12, height=14)),
+        ),
+    ],
+    ids=["figure", "box", "ball", "cylinder", "plate with a low boss"],
+)
+@pytest.mark.parametrize("azimuth_deg", [15.0, 200.0])
+def test_an_object_without_a_table_has_none(mesh: TriangleMesh, azimuth_deg: float):
+    assert not stands_on_support(prepare(seen(mesh, azimuth_deg), PrepareConfig()))
+
+
+def test_noise_and_a_line_of_points_are_no_table():
+    rng = np.random.default_rng(0)
+    assert find_support(rng.normal(size=(3000, 3)), 0.05) is None
+    line = np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0])
+    assert find_support(line, 0.002) is None
+
+
+def test_a_table_in_most_scans_is_left_out_of_these():
+    scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
+    scans.append(seen(small_creature(), 270.0))
+    prepared = taken_in(scans).prepared
+    assert {scan.name for scan in prepared if scan.is_without_support} == {
+        "at 0",
+        "at 90",
+        "at 180",
+    }
+
+
+def test_a_plane_in_few_scans_belongs_to_the_object():
+    scans = [seen(small_creature(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
+    scans.append(seen(on_table(), 270.0))
+    assert not any(scan.is_without_support for scan in taken_in(scans).prepared)
+
+
+def test_the_table_is_kept_where_the_settings_say_so():
+    scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0)]
+    config = Config(prepare=PrepareConfig(support="kept"))
+    assert not any(scan.is_without_support for scan in taken_in(scans, config).prepared)
+    hashes = {
+        scan.work_hash for scan in (*taken_in(scans).prepared, *taken_in(scans, config).prepared)
+    }
+    assert len(hashes) == 4, "work on a scan with its table must not be taken for one without"
