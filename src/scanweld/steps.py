@@ -17,6 +17,7 @@ from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.given import easier_verdict, pairs_as_given, with_given
 from scanweld.multiview.merge import Judge
 from scanweld.multiview.refine_graph import Refine, refine_graph
+from scanweld.multiview.scale import estimate_scales
 from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
@@ -127,10 +128,20 @@ def refine_placed(
         axis = _common_axis(intake, fields, graph.pairs, config)
         if axis is not None:
             doubts = {**off_axis_doubts(graph, axis), **doubts}
-        graph = replace(graph, doubts=doubts)
+        graph = replace(graph, doubts={**_scale_doubts(intake, graph), **doubts})
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     return graph
+
+
+def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:
+    """Scans that fit the others better when they are made larger or smaller."""
+    return {
+        k: estimate.words()
+        for component in graph.components
+        for k, estimate in estimate_scales(intake.prepared, component.poses).items()
+        if estimate.is_off
+    }
 
 
 def _common_axis(

@@ -95,7 +95,7 @@ def refine_poses(
     views = {(min(pair), max(pair)) for pair in pairs}
     step = 0.0
     for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
-        surface = _match_surfaces(sources, poses, float(radius) * diameter)
+        surface = match_surfaces(sources, poses, float(radius) * diameter)
         contour: list[Found] = []
         if contour_matches is not None and n >= config.num_rounds - contour_rounds:
             touching = {(min(i, j), max(i, j)) for i, j, _ in surface}
@@ -104,7 +104,7 @@ def refine_poses(
         poses, moved = move_poses(terms, poses, diameter / 3, MAX_STEP_DIAMETERS * diameter)
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
-    surface = _match_surfaces(sources, poses, config.match_diameters[1] * diameter)
+    surface = match_surfaces(sources, poses, config.match_diameters[1] * diameter)
     terms = weighted_terms(surface, [], poses, 0.0, noise)
     rms = _rms(terms)
     logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
@@ -122,9 +122,10 @@ def scan_rms(refinement: Refinement) -> dict[int, float]:
     return {k: float(np.sqrt(square / count)) for k, (square, count) in sorted(sums.items())}
 
 
-def _match_surfaces(
+def match_surfaces(
     sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], radius: float
 ) -> list[Found]:
+    """Point-to-plane matches between all scans that touch at their poses, in both directions."""
     found = []
     for i, j in permutations(poses, 2):
         matches = surface_matches(sources[i], sources[j], poses[j].inverse() @ poses[i], radius)

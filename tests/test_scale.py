@@ -1,0 +1,80 @@
+"""Scans whose unit is a little off are found, and by how much; the others are not blamed."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from scanweld.config import PrepareConfig, RefineConfig
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.multiview.refine import refine_poses
+from scanweld.multiview.scale import ScaleEstimate, estimate_scales
+from scanweld.prepare import prepare
+from tests.prepared import scaled
+from tests.scenes import creature_scene
+
+NOISE = NoiseModel(depth_diameters=5e-4)
+
+
+@lru_cache
+def placed(factor: float, unit: float = 1.0) -> tuple[list[PreparedScan], dict[int, Pose]]:
+    """Six scans at their refined poses, the third one too large by a factor."""
+    scene = creature_scene(6, noise=NOISE, seed=3)
+    scans, poses = [], {}
+    for k, scan in enumerate(scene.scans):
+        larger = factor if k == 2 else 1.0
+        scans.append(prepare(scaled(scan, larger * unit), PrepareConfig()))
+        true = scene.world_from_scan[scan.name] @ scan.sensor_pose
+        middle = scan.sensor_pose.inverse().apply(scan.points).mean(axis=0)
+        shift = true.rotation @ (middle - larger * middle)
+        poses[k] = Pose(rotation=true.rotation, translation=unit * (true.translation + shift))
+    return scans, refine_poses(scans, poses, [], RefineConfig()).poses
+
+
+def estimates(factor: float, unit: float = 1.0) -> dict[int, ScaleEstimate]:
+    scans, poses = placed(factor, unit)
+    return estimate_scales(scans, poses)
+
+
+@pytest.mark.parametrize("factor", [1.01, 0.99, 1.02])
+def test_the_scan_that_is_off_is_named_with_its_factor(factor: float):
+    found = estimates(factor)
+    assert [k for k, estimate in found.items() if estimate.is_off] == [2]
+    assert found[2].factor == pytest.approx(factor, abs=0.25 * abs(factor - 1))
+
+
+def test_scans_in_one_unit_are_not_blamed():
+    found = estimates(1.0)
+    assert not any(estimate.is_off for estimate in found.values())
+    assert max(abs(estimate.factor - 1) for estimate in found.values()) < 0.002
+    assert all(0 < estimate.deviation < 0.005 for estimate in found.values())
+
+
+def test_the_unit_of_all_does_not_matter():
+    mm, m = estimates(1.01), estimates(1.01, 1e-3)
+    for k, estimate in mm.items():
+        assert m[k].factor == pytest.approx(estimate.factor, abs=1e-4)
+
+
+def test_words_give_the_factor_that_a_user_can_apply():
+    large = ScaleEstimate(factor=1.0101, deviation=0.0011)
+    small = ScaleEstimate(factor=0.99, deviation=0.001)
+    assert "1.010 times too large" in large.words() and "0.001" in large.words()
+    assert "1.010 times too small" in small.words()
+
+
+def test_scans_that_touch_nothing_have_no_scale():
+    scans, poses = placed(1.0)
+    apart = {
+        k: Pose(rotation=pose.rotation, translation=pose.translation + 1e4 * k)
+        for k, pose in poses.items()
+    }
+    assert estimate_scales(scans, apart) == {}
+
+
+def test_an_uncertain_scale_is_no_accusation():
+    assert not ScaleEstimate(factor=1.02, deviation=0.01).is_off
+    assert not ScaleEstimate(factor=1.003, deviation=1e-5).is_off
+    assert ScaleEstimate(factor=np.exp(-0.01), deviation=0.002).is_off
