@@ -50,8 +50,8 @@ def a_pair(i: str, j: str) -> PairReport:
         margin=0.8,
         observability=1e-3,
         alternatives=(
-            AlternativeReport(i_from_j=turned(1), score=EVIDENCE.score),
-            AlternativeReport(i_from_j=turned(2), score=0.1),
+            AlternativeReport(i_from_j=turned(1), score=EVIDENCE.score, weight=0.75),
+            AlternativeReport(i_from_j=turned(2), score=0.1, weight=0.25),
         ),
     )
 

@@ -67,7 +67,8 @@ def test_graph(result: Reconstruction):
         ("scan_10", "überzählig"),
     ]
     assert pairs[0]["evidence"] == dataclasses.asdict(EVIDENCE)
-    assert pairs[0]["alternatives"][1] == {"i_from_j": turned(2).matrix().tolist(), "score": 0.1}
+    rival = {"i_from_j": turned(2).matrix().tolist(), "score": 0.1, "weight": 0.25}
+    assert pairs[0]["alternatives"][1] == rival
     nothing = pairs[2]
     assert nothing["kind"] == "no overlap" and not nothing["accepted"]
     assert nothing["i_from_j"] is nothing["score"] is nothing["evidence"] is None

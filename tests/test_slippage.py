@@ -17,7 +17,7 @@ from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.information import TURN_SCALE, information_of
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind
-from scanweld.pairs.slippage import Slide, Slippage, slippage_of
+from scanweld.pairs.slippage import Slide, Slippage, slide_words, slippage_of
 from tests.prepared import PreparedPair, pair_of_scene
 from tests.scenes import random_motion, scene_of, small_creature
 
@@ -204,7 +204,7 @@ def test_noise_of_a_quarter_percent_hides_no_sliding_pair(name: str):
     result = register_pair(0, 1, *pair.fields, both, pair.diameter, CONFIG)
     assert result.kind is PairKind.SLIDING
     assert result.sliding is not None and result.sliding.slide is RENDERED[name][0]
-    assert result.sliding.words in result.reason and "free to" in result.reason
+    assert slide_words(result.sliding.slide) in result.reason and "free to" in result.reason
     assert result.observability < CONFIG.min_observability
 
 

@@ -10,9 +10,10 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import Features
 from scanweld.intake import Intake
+from scanweld.multiview.explain import why_open
 from scanweld.multiview.view_graph import ViewGraph
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.result import Alternative, Evidence, PairResult
+from scanweld.pairs.result import Alternative, Evidence, PairResult, weights_of
 from scanweld.pairs.visibility import judge
 from scanweld.reconstruction import (
     AlternativeReport,
@@ -60,7 +61,7 @@ def conclude(
         scans=dict(sorted(scans.items())),
         pairs=tuple(
             sorted(
-                (_pair_report(prepared, graph, edge) for edge in graph.pairs),
+                (_pair_report(prepared, graph, edge, config) for edge in graph.pairs),
                 key=lambda pair: (pair.i, pair.j),
             )
         ),
@@ -171,10 +172,11 @@ def _camera_words(camera: Camera | None) -> str | None:
 
 
 def _pair_report(
-    prepared: Sequence[PreparedScan], graph: ViewGraph, edge: tuple[int, int]
+    prepared: Sequence[PreparedScan], graph: ViewGraph, edge: tuple[int, int], config: Config
 ) -> PairReport:
     result = graph.pairs[edge]
     chosen = graph.accepted.get(edge) or result.best
+    weights = weights_of(result.alternatives, config.pairs.min_margin, config.pairs.min_score)
     a, b = (prepared[k] for k in edge)
     is_swapped = b.name < a.name
     first, second = (b, a) if is_swapped else (a, b)
@@ -197,8 +199,10 @@ def _pair_report(
         observability=result.observability,
         sliding=None if result.sliding is None else result.sliding.slide,
         alternatives=tuple(
-            AlternativeReport(i_from_j=between_scans(option.i_from_j), score=option.score)
-            for option in result.alternatives
+            AlternativeReport(
+                i_from_j=between_scans(option.i_from_j), score=option.score, weight=weight
+            )
+            for option, weight in zip(result.alternatives, weights, strict=True)
         ),
     )
 
@@ -226,7 +230,8 @@ def _verdict(
         if fact.verdict is FactVerdict.CONTRADICTED
     ]
     if not graph.components:
-        return Verdict.NOTHING, ("no two scans could be registered to each other", *denied)
+        told = ("no two scans could be registered to each other", *why_open(graph), *denied)
+        return Verdict.NOTHING, told
     by_verdict = {
         kind: [name for name, scan in sorted(scans.items()) if scan.verdict is kind]
         for kind in ScanVerdict
@@ -241,6 +246,7 @@ def _verdict(
         reasons.append(f"the scans fall into {len(graph.components)} components of {sizes} scans")
     if mesh is None:
         reasons.append("the placed scans could not be fused into a model")
+    reasons += why_open(graph)
     reasons += denied
     if by_verdict[ScanVerdict.DOUBTFUL] or denied:
         return Verdict.DOUBTFUL, tuple(reasons)

@@ -74,10 +74,17 @@ class ScanReport:
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class AlternativeReport:
-    """A distinct pose of a pair (scan frames, in the scans' unit) and its score."""
+    """A distinct pose of a pair (scan frames, in the scans' unit) and its score.
+
+    Attributes:
+        i_from_j: The pose.
+        score: Its score.
+        weight: How much it counts beside the pair's other poses; they sum to 1.
+    """
 
     i_from_j: Pose
     score: float
+    weight: float
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -72,7 +72,7 @@ def _pair(pair: PairReport) -> Json:
         "observability": pair.observability,
         "sliding": pair.sliding,
         "alternatives": [
-            {"i_from_j": _matrix(other.i_from_j), "score": other.score}
+            {"i_from_j": _matrix(other.i_from_j), "score": other.score, "weight": other.weight}
             for other in pair.alternatives
         ],
     }

@@ -1,13 +1,21 @@
 """In words: why a pair is not used, why a scan is not placed, what speaks against a placed one."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 from scanweld.config import GraphConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.multiview.merge import Judge, is_near
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
+from scanweld.pairs.slippage import Slide, slide_words
+from scanweld.pairs.symmetry import fold_words
 
+Said = TypeVar("Said")
+
+MIN_ALIKE = 2
+"""So many pairs, more than half of their kind, must say the same of the object to be quoted."""
 OUTWEIGHED = 2.0
 """Accepted pairs outweigh a good one that disagrees if their scores sum to so many times its."""
 
@@ -45,6 +53,29 @@ def why_unplaced(scan: int, pairs: Mapping[Edge, PairResult]) -> str:
     score, result = max(options, key=lambda option: option[0])
     told = result.reason or "it contradicts other scans"
     return f"no pair with another scan holds; the best one (score {score:.2f}): {told}"
+
+
+def why_open(graph: ViewGraph) -> tuple[str, ...]:
+    """Which symmetries leave poses open: what several pairs of scans not safely placed agree on."""
+    unsure = graph.unplaced.keys() | graph.doubts.keys()
+    pairs = [result for edge, result in sorted(graph.pairs.items()) if unsure & set(edge)]
+    told = []
+    folds = [p.symmetry.fold if p.symmetry.angles_deg else 0 for p in pairs if p.symmetry]
+    fold, count = _agreed(folds)
+    if count and fold != 0:
+        words = fold_words(fold)
+        told.append(f"the object looks alike after {words} ({count} pairs): poses are open")
+    slide, count = _agreed([p.sliding.slide for p in pairs if p.sliding])
+    if count and slide is not None and slide is not Slide.MANY:
+        words = slide_words(slide)
+        told.append(f"the scans slide on each other {words} ({count} pairs): poses are open")
+    return tuple(told)
+
+
+def _agreed(said: Sequence[Said]) -> tuple[Said | None, int]:
+    """What most say, and how many do; 0 where there is no agreement."""
+    most, count = max(Counter(said).items(), key=lambda item: item[1], default=(None, 0))
+    return most, count if count >= MIN_ALIKE and 2 * count > len(said) else 0
 
 
 def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int, str]:

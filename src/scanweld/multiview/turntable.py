@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.pose import Pose, rotation_exp, rotation_log
+from scanweld.geometry.axis import Axis, fit_axis
+from scanweld.geometry.pose import Pose
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 
@@ -22,23 +23,6 @@ FINAL_RESIDUALS = 4.0
 """or to so many times the residual of the good pairs, if that is more."""
 NUM_FITS = 3
 """Fits, each to the pairs that agree with the one before."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Axis:
-    """A line: a unit direction (3,) and a point (3,) on it."""
-
-    direction: FloatArray
-    point: FloatArray
-
-    def nearest_turn(self, motion: Pose) -> Pose:
-        """The rotation about the line whose angle is closest to a motion's."""
-        r = motion.rotation
-        skew = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-        along = float(self.direction @ r @ self.direction)
-        angle = np.arctan2(float(self.direction @ skew), float(np.trace(r)) - along)
-        turn = rotation_exp(angle * self.direction)
-        return Pose(rotation=turn, translation=self.point - turn @ self.point)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -168,7 +152,8 @@ def _consensus(
                 for i, j in edges
             ]
             middle = np.mean([frames[j].apply(centres[j]) for _, j in edges], axis=0)
-            found = Turntable(axis=_fit(motions, middle), frames=frames, centres=centres, near=near)
+            axis = fit_axis(motions, middle)
+            found = Turntable(axis=axis, frames=frames, centres=centres, near=near)
             edges = tuple(
                 edge for edge in good if found.allows(edge, good[edge].alternatives[0].i_from_j)
             )
@@ -196,17 +181,3 @@ def _with_residual(
         angle_deg=float(angle),
         shift=float(shift),
     )
-
-
-def _fit(motions: Sequence[Pose], middle: FloatArray) -> Axis:
-    """The line that motions turn about best; its point is the one nearest to a given middle."""
-    # As rotation vectors: small turns say little of the direction, and count little.
-    turns = np.array([rotation_log(motion.rotation) for motion in motions])
-    direction = np.linalg.eigh(turns.T @ turns)[1][:, -1]
-    direction = direction * (1.0 if direction[np.argmax(np.abs(direction))] > 0 else -1.0)
-    # Points on the axis stay where they are: (I - R) c = t, solved about the middle.
-    across = np.eye(3) - np.outer(direction, direction)
-    rows = np.concatenate([*(np.eye(3) - motion.rotation for motion in motions)]) @ across
-    moved = np.concatenate([motion.apply(middle) - middle for motion in motions])
-    offset = np.linalg.lstsq(rows, moved, rcond=1e-9)[0]
-    return Axis(direction=direction, point=middle + across @ offset)

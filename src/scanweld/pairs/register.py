@@ -13,7 +13,8 @@ from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
 from scanweld.pairs.icp import IcpSchedule, icp
 from scanweld.pairs.information import information_of
-from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult
+from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult, near_best, weights_of
+from scanweld.pairs.symmetry import symmetry_of
 from scanweld.pairs.verdict import classify_pair
 from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
 
@@ -32,6 +33,9 @@ NUM_COARSE_SAMPLES = 200
 NUM_FINE_SAMPLES = 400
 """and while those that are left are looked at closely."""
 RANKING_WEIGHTS = search_weights(VIOLATION_WEIGHT)
+ALIKE_SHARE = 0.5
+"""Rivals within this share of the margin that makes a pose sure show symmetries; those beaten more
+clearly are often chance."""
 NUM_POLISHED = 2
 """Alternatives that are refined with all points and contours, at most."""
 MIN_POLISHED_SCORE = -0.1
@@ -218,11 +222,15 @@ def result_of(
 ) -> PairResult:
     """The result of a pair from its distinct poses, the one to be judged first."""
     information, rms = np.zeros((6, 6)), float("nan")
+    rivals = near_best(alternatives, ALIKE_SHARE * config.min_margin)
+    weights = weights_of(rivals, config.min_margin, config.min_score)
+    poses = [rival.i_from_j for rival in rivals]
+    symmetry = symmetry_of(poses, weights, field_j.centre, diameter)
     if alternatives:
         radius = config.tolerance_diameters[2] * diameter
         pose = alternatives[0].i_from_j
         information, rms, _ = information_of(field_i, field_j, pose, radius, diameter)
-    return classify_pair(i, j, alternatives, information, rms, config)
+    return classify_pair(i, j, alternatives, information, rms, symmetry, config)
 
 
 def alternative_at(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> Alternative:

@@ -9,6 +9,7 @@ import numpy as np
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.slippage import Slippage
+from scanweld.pairs.symmetry import Symmetry
 
 VIOLATION_WEIGHT = 3.0
 """How much more a sample says that the other sensor contradicts than one that agrees."""
@@ -16,6 +17,10 @@ CONTRADICT_WEIGHT = 1.5
 """Samples with other normals say less: at edges normals are poor."""
 FREE_WEIGHT = 1.0 / 3.0
 """Samples in free space say less still: real silhouettes have gaps."""
+
+
+MARGIN_WEIGHT = 2.0
+"""Logarithm of the weight that a pose has over a rival which it beats by just the margin."""
 
 
 class PairKind(StrEnum):
@@ -95,6 +100,41 @@ class Alternative:
         return self.evidence.score
 
 
+def near_best(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
+    """The first alternative, its best rival, and others it does not beat by a share of its score.
+
+    Args:
+        alternatives: Distinct poses of a pair, the one to be judged first, rivals best first.
+        max_margin: The share.
+    """
+    if len(alternatives) < 2:
+        return list(alternatives)
+    first, rival, *others = alternatives
+    least = (1.0 - max_margin) * first.score
+    return [first, rival, *(option for option in others if option.score >= least)]
+
+
+def weights_of(
+    alternatives: Sequence[Alternative], min_margin: float, min_score: float
+) -> tuple[float, ...]:
+    """How much each alternative counts beside the others; sums to 1.
+
+    Weights fall exponentially with the score, by e^2 = 7.4 where the best pose beats a rival by
+    just the margin that makes it sure.
+
+    Args:
+        alternatives: Distinct poses of a pair.
+        min_margin: Share of the score by which a pose must beat its rivals to be sure.
+        min_score: Least score of a pair; of worse ones the margin is not measured.
+    """
+    if not alternatives:
+        return ()
+    scores = np.array([option.score for option in alternatives])
+    step = max(min_margin * max(scores.max(), min_score), np.finfo(float).eps)
+    weights = np.exp(MARGIN_WEIGHT * (scores - scores.max()) / step)
+    return tuple((weights / weights.sum()).tolist())
+
+
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class PairResult:
     """What was found out about scans i < j; poses relate their sensor frames.
@@ -108,9 +148,10 @@ class PairResult:
         information: (6, 6) point-to-plane information of the best pose, as ``information_of``
             gives it.
         observability: Smallest over largest eigenvalue of the information; 0 if that is negative.
-        sliding: Which motion is free, where the pair is a sliding one.
         margin: Share of the best score by which it beats its best distinct rival; 1 without rival.
         rms: Point-to-plane residual of the best pose's matches, in the scans' unit; NaN if none.
+        sliding: Which motion is free, where the pair is a sliding one.
+        symmetry: What the equally good poses of an ambiguous pair have in common.
     """
 
     i: int
@@ -123,6 +164,7 @@ class PairResult:
     margin: float
     rms: float
     sliding: Slippage | None = None
+    symmetry: Symmetry | None = None
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

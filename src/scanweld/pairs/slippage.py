@@ -65,10 +65,10 @@ class Slippage:
             if value is not None:
                 object.__setattr__(self, name, frozen(value, np.float64, (3,)))
 
-    @property
-    def words(self) -> str:
-        """How it slides, in words."""
-        return _WORDS[self.slide]
+
+def slide_words(slide: Slide) -> str:
+    """How surfaces slide, in words."""
+    return _WORDS[slide]
 
 
 def slippage_of(information: FloatArray, min_observability: float) -> Slippage | None:

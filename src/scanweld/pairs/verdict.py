@@ -5,7 +5,8 @@ import numpy as np
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.result import Alternative, PairKind, PairResult, margin_over
-from scanweld.pairs.slippage import Slippage, slippage_of
+from scanweld.pairs.slippage import Slippage, slide_words, slippage_of
+from scanweld.pairs.symmetry import Symmetry
 
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
@@ -17,6 +18,7 @@ def classify_pair(
     alternatives: tuple[Alternative, ...],
     information: FloatArray,
     rms: float,
+    symmetry: Symmetry | None,
     config: PairsConfig,
 ) -> PairResult:
     """Give a pair its kind: what its evidence, margin and observability allow to say.
@@ -27,6 +29,7 @@ def classify_pair(
         alternatives: Distinct poses between the sensor frames, best first.
         information: (6, 6) information of the best pose.
         rms: Residual of the best pose, in the scans' unit; NaN if there is none.
+        symmetry: What the best pose and its rivals have in common; None without a rival.
         config: Settings.
     """
     eigenvalues = np.linalg.eigvalsh(information)
@@ -36,7 +39,7 @@ def classify_pair(
     scores = [alternative.score for alternative in alternatives]
     margin = margin_over(scores[0], scores[1:]) if scores else 0.0
     sliding = slippage_of(information, config.min_observability)
-    kind, reason = _kind(alternatives, sliding, margin, config)
+    kind, reason = _kind(alternatives, sliding, margin, symmetry, config)
     return PairResult(
         i=i,
         j=j,
@@ -48,6 +51,7 @@ def classify_pair(
         margin=margin,
         rms=rms,
         sliding=sliding if kind is PairKind.SLIDING else None,
+        symmetry=symmetry if kind is PairKind.AMBIGUOUS else None,
     )
 
 
@@ -70,6 +74,7 @@ def _kind(
     alternatives: tuple[Alternative, ...],
     sliding: Slippage | None,
     margin: float,
+    symmetry: Symmetry | None,
     config: PairsConfig,
 ) -> tuple[PairKind, str]:
     if not alternatives or alternatives[0].evidence.agree < MIN_AGREE:
@@ -82,7 +87,9 @@ def _kind(
         told = f"score {best.score:.2f} below {config.min_score:.2f}"
         return PairKind.NO_OVERLAP, f"too little overlap to be sure: {told}"
     if sliding is not None:
-        return PairKind.SLIDING, f"the surfaces slide on each other {sliding.words}"
+        return PairKind.SLIDING, f"the surfaces slide on each other {slide_words(sliding.slide)}"
     if margin < config.min_margin:
-        return PairKind.AMBIGUOUS, f"another pose explains the scans as well: margin {margin:.2f}"
+        told = f"another pose explains the scans as well: margin {margin:.2f}"
+        apart = "" if symmetry is None else f"; what lies between: {symmetry.words}"
+        return PairKind.AMBIGUOUS, told + apart
     return PairKind.GOOD, ""
