@@ -1,12 +1,12 @@
 """Scans whose unit is a little off: the scales that would make the placed surfaces agree."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import damped
+from scanweld.geometry.gauss_newton import damped, motion_of
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.multiview.least_squares import Term, weighted_terms
@@ -15,12 +15,13 @@ from scanweld.multiview.refine import (
     SURFACE_NOISE_DIAMETERS,
     match_surfaces,
 )
-from scanweld.multiview.surface_terms import surface_source
+from scanweld.multiview.surface_terms import SurfaceSource, surface_source
 
 MATCH_DIAMETERS = 0.012
 """Farthest match: a scale that is off by a percent moves surfaces by half of that."""
 CORRELATED_MATCHES = 30.0
 """Neighbouring matches err alike: so many are worth one."""
+NUM_ROUNDS = 4
 NUM_UNKNOWNS = 7
 MIN_ERROR = 0.004
 """Scales that are off by less are within what sensors do,"""
@@ -59,7 +60,7 @@ class ScaleEstimate:
 def estimate_scales(
     scans: Sequence[PreparedScan], world_from_sensor: Mapping[int, Pose]
 ) -> dict[int, ScaleEstimate]:
-    """Free the scale of every placed scan beside its pose, in one step of least squares.
+    """Free the scale of every placed scan beside its pose, in a few steps of least squares.
 
     Args:
         scans: All scans.
@@ -71,25 +72,54 @@ def estimate_scales(
     poses = dict(sorted(world_from_sensor.items()))
     diameter = float(np.median([scans[k].diameter for k in poses]))
     sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
+    logs = dict.fromkeys(poses, 0.0)
+    deviations: dict[int, float] = {}
+    for _ in range(NUM_ROUNDS):
+        grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
+        terms = _surface_terms(grown, poses, diameter)
+        order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
+        if len(order) < 2:
+            return {}
+        centres = {k: poses[k].apply(grown[k].points.mean(axis=0)) for k in order}
+        twists, steps, spreads = _solve(terms, order, centres, diameter / 3)
+        middle = np.mean([centres[k] for k in order], axis=0)
+        for k, twist, step, spread in zip(order, twists, steps, spreads, strict=True):
+            # Grown about the sensor in the next round, it is moved back to where it was.
+            about = poses[k].translation
+            back = (1.0 - np.exp(step)) * (centres[k] - about)
+            stay = Pose(rotation=np.eye(3), translation=back)
+            poses[k] = motion_of(twist, middle, diameter / 3) @ stay @ poses[k]
+            logs[k] -= step
+            deviations[k] = float(spread)
+    usual = float(np.median([logs[k] for k in order]))
+    return {
+        k: ScaleEstimate(factor=float(np.exp(logs[k] - usual)), deviation=deviations[k])
+        for k in order
+    }
+
+
+def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:
+    """The same surface as a sensor sees it whose ranges are longer by a factor."""
+    camera = np.array(source.camera)
+    if camera[0] != 0.0:
+        camera[1:3] /= factor
+    return replace(
+        source, points=factor * source.points, depth=factor * source.depth, camera=camera
+    )
+
+
+def _surface_terms(
+    sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], diameter: float
+) -> list[Term]:
     found = match_surfaces(sources, poses, MATCH_DIAMETERS * diameter)
     noise = SURFACE_NOISE_DIAMETERS * diameter, 1.0
-    terms = weighted_terms(found, [], poses, 0.0, noise)
-    order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
-    if len(order) < 2:
-        return {}
-    centres = {k: poses[k].apply(sources[k].points.mean(axis=0)) for k in order}
-    logs, deviations = _solve(terms, order, centres, diameter / 3)
-    logs = logs - np.median(logs)
-    return {
-        k: ScaleEstimate(factor=float(np.exp(log)), deviation=float(deviation))
-        for k, log, deviation in zip(order, logs, deviations, strict=True)
-    }
+    return weighted_terms(found, [], poses, 0.0, noise)
 
 
 def _solve(
     terms: Sequence[Term], order: Sequence[int], centres: Mapping[int, FloatArray], arm: float
-) -> tuple[FloatArray, FloatArray]:
-    """Logarithms of the factors (N,) and their standard deviations."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Twists (N, 6) and growths (N,) that make surfaces agree, and the growths' deviations."""
     size = NUM_UNKNOWNS * len(order)
     place = {k: slice(NUM_UNKNOWNS * n, NUM_UNKNOWNS * (n + 1)) for n, k in enumerate(order)}
     normal, gradient = np.zeros((size, size)), np.zeros(size)
@@ -119,8 +149,8 @@ def _solve(
     solved[free] = -inverse @ gradient[free]
     variance = np.zeros(size)
     variance[free] = np.diag(inverse) * CORRELATED_MATCHES * square / max(count, 1e-300)
-    # A scan that is too large has to shrink to agree.
-    return -solved[growths], np.sqrt(variance[growths])
+    steps = solved.reshape(-1, NUM_UNKNOWNS)
+    return steps[:, :-1], steps[:, -1], np.sqrt(variance[growths])
 
 
 def _by_growth(term: Term, centre: FloatArray) -> FloatArray:

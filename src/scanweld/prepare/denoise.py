@@ -4,10 +4,13 @@ Each pixel takes the depth of a plane that fits its neighbours on the same surfa
 surface moves by less than its noise, and steps between surfaces stay.
 """
 
+from math import comb
+
 import numpy as np
 from numba import njit
 
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 
 CLEAN_NOISE_PIXELS = 0.15
 """Noise of depth, in footprints, below which an image is not smoothed: normals bear it."""
@@ -22,7 +25,7 @@ NUM_ROUNDS = 4
 """Rounds of reweighting of a plane, from steps that a surface may have to the noise alone."""
 NOISE_REACH = 2.5
 """Depths farther than so many standard deviations from a plane hardly belong to it."""
-MIN_REACH_PIXELS = 0.5
+MIN_REACH_PIXELS = 1.0
 """The same in footprints where there is little noise: surfaces curve."""
 MIN_SUPPORT = 0.25
 """Share of a neighbourhood that must lie on its plane: a corner's is a quarter."""
@@ -52,13 +55,20 @@ def clean_depth(depth: FloatArray, pixel: float, max_step: float) -> FloatArray:
 
 
 def noise_of(depth: FloatArray) -> float:
-    """Standard deviation of depth (H, W) by its second differences, robust; 0 without any."""
-    second = [
-        depth[:, :-2] - 2 * depth[:, 1:-1] + depth[:, 2:],
-        depth[:-2] - 2 * depth[1:-1] + depth[2:],
-    ]
-    steps = np.concatenate([d[np.isfinite(d)] for d in second])
-    return float(1.4826 / np.sqrt(6) * np.median(np.abs(steps))) if len(steps) else 0.0
+    """Standard deviation of depth (H, W) by its differences along rows and columns, robust.
+
+    Second differences see curvature as noise; fourth ones do not, where there are enough.
+    """
+    second, num_second = _noise_by_differences(depth, 2)
+    fourth, num_fourth = _noise_by_differences(depth, 4)
+    return min(second, fourth) if num_fourth > num_second / 2 else second
+
+
+def _noise_by_differences(depth: FloatArray, order: int) -> tuple[float, int]:
+    steps = np.concatenate([np.diff(depth, order, axis=axis).ravel() for axis in (0, 1)])
+    steps = np.abs(steps[np.isfinite(steps)])
+    growth = np.sqrt(comb(2 * order, order))
+    return float(MAD_TO_SIGMA * np.median(steps) / growth) if len(steps) else 0.0, len(steps)
 
 
 def has_gaps(depth: FloatArray) -> bool:
