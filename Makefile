@@ -32,7 +32,7 @@ paper: $(VENV)/.installed-bench
 # What it asserts under hard conditions, held against the truth, into docs/trust.md; up to an hour
 # on 2 cores, and goes on where it was stopped. A handful of runs: make trust TRUST="--quick --out trust"
 trust: $(VENV)/.installed-bench
-	$(BIN)/python -m benchmarks.trust $(TRUST)
+	$(BIN)/python -m benchmarks.trust --compare $(TRUST)
 
 clean:
 	rm -rf $(VENV) demo

@@ -1,16 +1,20 @@
 """What the runs must show, beside what they show."""
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from benchmarks.judging.measures import calibration_error
 from benchmarks.judging.trial import Outcome, PairOutcome, ScanOutcome
 from benchmarks.paper.success import auc
+from benchmarks.sets import SETS
+from benchmarks.sets import Floors as SetFloors
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Group
+from scanweld.reconstruction import Verdict
 
 MIN_CLEAN, MIN_HARD, MIN_CROP = 0.97, 0.90, 0.80
 MIN_AUC, MAX_CALIBRATION_ERROR = 0.99, 0.05
@@ -18,7 +22,7 @@ ASSERTED = 0.5
 """A pose with more confidence is asserted."""
 FACTOR_SLACK = 0.004
 """A factor that is named is this near to the true one."""
-_NUMBER = re.compile(r"\d+\.\d+")
+_NUMBER = re.compile(r"(\d+\.\d+)(\s*%)?")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -60,6 +64,27 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
     ]
 
 
+def real_sets(runs: Sequence[Mapping[str, Any]]) -> Floor:
+    """The records of ``benchmarks/run.py``, against the floors of its sets."""
+    met = [_is_met(run, SETS[run["set"]].floors) for run in runs]
+    good = sum(run["verdict"] == Verdict.GOOD for run in runs)
+    return Floor(
+        measure="the real sets: at their floors, verdict good",
+        asked="all",
+        reached=f"{sum(met)} of {len(runs)} at their floors, {good} good",
+        is_met=all(met) and good == len(runs),
+    )
+
+
+def _is_met(run: Mapping[str, Any], asked: SetFloors) -> bool:
+    limits = {k: v for k, v in asdict(asked).items() if k != "right" and v is not None}
+    return (
+        run["right"] >= asked.right
+        and run["wrong"] == 0
+        and all(run[key] is not None and run[key] <= limit for key, limit in limits.items())
+    )
+
+
 def scans_of(outcomes: Sequence[Outcome]) -> list[ScanOutcome]:
     """All scans of all runs."""
     return [scan for outcome in outcomes for scan in outcome.scans]
@@ -82,8 +107,8 @@ def share(scans: Sequence[ScanOutcome], holds: Callable[[ScanOutcome], bool]) ->
 
 def names_factor(scan: ScanOutcome) -> bool:
     """Whether the report says by which factor a scan's scale is wrong."""
-    told = [float(number) for number in _NUMBER.findall(scan.reason)]
-    factors = [f for number in told for f in (number, 1.0 + number / 100.0) if f > 0]
+    told = [(float(number), bool(percent)) for number, percent in _NUMBER.findall(scan.reason)]
+    factors = [1.0 + number / 100.0 if is_percent else number for number, is_percent in told]
     true = (scan.factor, 1.0 / scan.factor)
     return "scale" in scan.reason and any(abs(f - t) < FACTOR_SLACK for f in factors for t in true)
 

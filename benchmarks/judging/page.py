@@ -1,6 +1,5 @@
 """The page docs/trust.md: hand-written, but for its measured parts."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,11 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.blocks import rewritten
-from benchmarks.judging.floors import Floor, floors
+from benchmarks.judging.floors import Floor, floors, real_sets
+from benchmarks.judging.measures import brier, calibration_error
+from benchmarks.judging.plots import RELIABILITY, RISK, Stated, draw, stated_pairs, stated_scans
+from benchmarks.judging.rivals import rival_table
 from benchmarks.judging.table import outcomes_of
 from benchmarks.judging.tables import floor_table, misses, scenario_table
 from benchmarks.judging.trial import Outcome
-from benchmarks.paper.study import read_records
+from benchmarks.paper.pages import markdown_table
+from benchmarks.paper.study import Record, read_records
+from benchmarks.paper.success import auc
+from benchmarks.results import read_results
 from scanweld.io.atomic import write_whole
 
 PAGE = "trust.md"
@@ -31,7 +36,7 @@ class Results:
     @cached_property
     def document(self) -> dict[str, Any]:
         """What stands beside the runs: the command, the machine."""
-        return json.loads((self.folder / "data/trust.json").read_text(encoding="utf-8"))
+        return read_results(self.folder / "data/trust.json")
 
     @cached_property
     def outcomes(self) -> list[Outcome]:
@@ -39,9 +44,15 @@ class Results:
         return outcomes_of(read_records(self.folder, "trust"))
 
     @cached_property
+    def rivals(self) -> list[Record]:
+        """What other tools say of the same pairs."""
+        return read_records(self.folder, "rivals")
+
+    @cached_property
     def floors(self) -> list[Floor]:
-        """What they must show, and show."""
-        return floors(self.outcomes)
+        """What must be shown, and is."""
+        sets = read_results(self.folder / "data/sets.json")["records"]
+        return [*floors(self.outcomes), real_sets(sets)]
 
 
 def page_text(text: str, results: Results) -> str:
@@ -58,11 +69,17 @@ def block(name: str, results: Results) -> str:
 
 
 def write_page(folder: Path) -> None:
-    """Write the measured parts of the folder's page anew, if it has one."""
+    """Draw its pictures, and write the measured parts of the folder's page anew."""
+    results = Results(folder)
+    if (folder / "data/trust.json").exists() and _is_stated(results):
+        draw(results.outcomes, folder)
     page = folder / PAGE
-    if page.exists():
-        text = page_text(page.read_text(encoding="utf-8"), Results(folder))
-        write_whole(page, text.encode())
+    write_whole(page, page_text(page.read_text(encoding="utf-8"), results).encode())
+
+
+def _is_stated(results: Results) -> bool:
+    """Whether confidences were stated at all."""
+    return bool(stated_pairs(results.outcomes) and stated_scans(results.outcomes))
 
 
 def _told(results: Results) -> str:
@@ -74,6 +91,30 @@ def _told(results: Results) -> str:
     )
 
 
+def _confidence(results: Results) -> str:
+    if not _is_stated(results):
+        return NOT_YET
+    stated = {"pairs": stated_pairs(results.outcomes), "scans": stated_scans(results.outcomes)}
+    table = markdown_table(
+        ("confidence of", "number", "right", "AUC", "calibration error", "Brier score"),
+        [(name, *_numbers(each)) for name, each in stated.items()],
+    )
+    pictures = (
+        f"![share of right answers by stated confidence]({RELIABILITY})\n\n"
+        f"![share of wrong answers among the most confident]({RISK})\n"
+    )
+    return f"{table}\n{pictures}"
+
+
+def _numbers(stated: Stated) -> tuple[str, ...]:
+    confidences, is_right = [c for c, _ in stated], [r for _, r in stated]
+    return (
+        *(str(len(stated)), str(sum(is_right)), f"{auc(confidences, is_right):.4f}"),
+        f"{calibration_error(confidences, is_right):.4f}",
+        f"{brier(confidences, is_right):.4f}",
+    )
+
+
 def _calibration(results: Results) -> str:
     return NOT_YET
 
@@ -81,6 +122,8 @@ def _calibration(results: Results) -> str:
 BLOCKS: dict[str, Callable[[Results], str]] = {
     "trust-floors": lambda results: _told(results) + floor_table(results.floors),
     "trust-scenarios": lambda results: scenario_table(results.outcomes),
+    "trust-confidence": _confidence,
+    "trust-rivals": lambda results: rival_table(results.rivals, results.outcomes),
     "trust-misses": lambda results: misses(results.outcomes),
     "calibration": _calibration,
 }

@@ -45,7 +45,7 @@ class Body:
     unmarked: TriangleMesh | None = None
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def make_body(name: str, seed: int) -> Body:
     """One of ``BODIES`` by its name, another one for every seed."""
     return BODIES[name](seed)

@@ -42,7 +42,7 @@ def gear_radius(rng: np.random.Generator) -> Profile:
     size = rng.uniform(38.0, 50.0)
 
     def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
-        return size + TOOTH_HEIGHT * np.tanh(4.0 * np.sin(12.0 * turn)) + 0.0 * level
+        return size + TOOTH_HEIGHT * np.tanh(4.0 * np.cos(12.0 * turn)) + 0.0 * level
 
     return radius
 
@@ -51,7 +51,7 @@ def keyed(plain: Profile) -> Profile:
     """The same with one tooth that is worn to half its height over its upper half."""
 
     def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
-        worn = np.abs(np.angle(np.exp(1j * (turn - np.pi / 24)))) < np.pi / 14
+        worn = np.abs(np.angle(np.exp(1j * turn))) < np.pi / 14
         return plain(turn, level) - np.where(worn & (level > 0.5), TOOTH_HEIGHT, 0.0)
 
     return radius

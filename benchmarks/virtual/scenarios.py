@@ -47,7 +47,7 @@ _reported = partial(_hard, group=Group.REPORTED, seeds=5)
 
 SCENARIOS: Mapping[str, Scenario] = {
     # Nothing goes wrong
-    "ring of 6": _clean(seeds=10),
+    "ring of 6": _clean(seeds=12),
     "ring of 8": _clean(seeds=8, views=ring(8)),
     "12 from anywhere": _clean(seeds=4, views=on_sphere(12)),
     "close-up": _clean(seeds=5, views=ring(6, distance_diameters=1.1)),

@@ -23,7 +23,7 @@ SLIGHT = NoiseModel(depth_diameters=5e-4, dropout=0.01, grazing_dropout=0.6)
 """What a good scanner does to depth."""
 ELEVATIONS_DEG = (20.0, -10.0)
 JITTER_DEG = 5.0
-OVERLAP_SAMPLES = 3000
+OVERLAP_SAMPLES = 1500
 OVERLAP_SPACINGS = 1.5
 """A point that is as near to another scan, in that scan's point spacings, lies on it."""
 

@@ -1,0 +1,85 @@
+"""Pictures of the page: what is stated against what came true."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.judging.floors import posed_pairs, scans_of
+from benchmarks.judging.measures import reliability, risk_coverage
+from benchmarks.judging.trial import Outcome
+from scanweld.evaluation.metrics import Standing
+
+RELIABILITY, RISK = "trust-reliability.png", "trust-risk.png"
+COLORS = {"pairs": "#1B6CA8", "placed scans": "#C2274B"}
+
+Stated = list[tuple[float, bool]]
+"""Confidences, and whether they were right."""
+
+
+def stated_pairs(outcomes: Sequence[Outcome]) -> Stated:
+    """Of all pairs that have a pose and a confidence."""
+    pairs = posed_pairs(outcomes)
+    return [(p.confidence, p.is_right) for p in pairs if p.confidence is not None]
+
+
+def stated_scans(outcomes: Sequence[Outcome]) -> Stated:
+    """Of all placed scans that have a confidence; one whose pose is open is not right."""
+    return [
+        (scan.confidence, scan.is_right and not scan.is_open)
+        for scan in scans_of(outcomes)
+        if scan.confidence is not None and scan.standing != Standing.UNPLACED
+    ]
+
+
+def draw(outcomes: Sequence[Outcome], folder: Path) -> None:
+    """Draw the reliability diagram and the risk-coverage curve into a folder."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    stated = {"pairs": stated_pairs(outcomes), "placed scans": stated_scans(outcomes)}
+    figure, axes = pyplot.subplots(figsize=(5.2, 4.6))
+    _draw_reliability(axes, stated)
+    _save(figure, folder / RELIABILITY)
+    figure, axes = pyplot.subplots(figsize=(6.4, 4.2))
+    _draw_risk(axes, stated)
+    _save(figure, folder / RISK)
+    pyplot.close("all")
+
+
+def _draw_reliability(axes: Any, stated: dict[str, Stated]) -> None:
+    axes.plot([0, 1], [0, 1], color="#8C929C", linewidth=1, linestyle="--")
+    for name, each in stated.items():
+        bins = reliability([c for c, _ in each], [r for _, r in each])
+        axes.plot(
+            [b.confidence for b in bins],
+            [b.right for b in bins],
+            color=COLORS[name],
+            marker="o",
+            markersize=4.5,
+            label=f"{name} ({len(each)})",
+        )
+    axes.set(xlabel="confidence that is stated", ylabel="share that is right")
+    axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
+    _dress(axes)
+
+
+def _draw_risk(axes: Any, stated: dict[str, Stated]) -> None:
+    for name, each in stated.items():
+        coverage, risk = risk_coverage([c for c, _ in each], [r for _, r in each])
+        axes.step(100 * coverage, 100 * risk, where="post", color=COLORS[name], label=name)
+    axes.set(xlabel="taken, the most confident first (%)", ylabel="wrong among these (%)")
+    axes.set(xlim=(0, 101), ylim=(-1, None))
+    _dress(axes)
+
+
+def _dress(axes: Any) -> None:
+    axes.grid(color="#E4E6EA", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+
+
+def _save(figure: Any, path: Path) -> None:
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
