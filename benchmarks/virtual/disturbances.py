@@ -45,10 +45,13 @@ def flying_pixels() -> Disturbance:
     def change(scan: RangeScan, rng: Rng) -> RangeScan:
         depth = depth_of(scan)
         size = principal_diameter(scan.points)
-        behind = np.where(np.isfinite(depth), depth, np.nanmax(depth) + 0.3 * size)
+        seen = np.isfinite(depth)
+        # A lost return is a gap in the surface, not a look past it.
+        is_past = ~ndimage.binary_closing(seen, np.ones((3, 3)))
+        behind = np.where(seen, depth, np.where(is_past, np.nanmax(depth) + 0.3 * size, -np.inf))
         far = ndimage.maximum_filter(behind, size=3)
-        near = ndimage.minimum_filter(np.where(np.isfinite(depth), depth, np.inf), size=3)
-        beside = far - np.where(np.isfinite(near), near, far) > JUMP_DIAMETERS * size
+        near = ndimage.minimum_filter(np.where(seen, depth, np.inf), size=3)
+        beside = np.isfinite(near) & (far - near > JUMP_DIAMETERS * size)
         chosen = beside & (rng.random(depth.shape) < FLYING_SHARE)
         part = rng.random(int(chosen.sum()))
         depth[chosen] = near[chosen] + part * (far - near)[chosen]

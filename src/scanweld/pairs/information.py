@@ -13,7 +13,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.icp import MIN_AGREEMENT, MIN_MATCHES
 
-NUM_DEVIATIONS = 6.0
+NUM_DEVIATIONS = 4.0
 """Standard deviations by which information must exceed what noise leaves of itself. They are those
 of independent matches; normals are smoothed, so that neighbours have errors in common."""
 TURN_SCALE = 3.0
@@ -25,7 +25,7 @@ def information_of(
 ) -> tuple[FloatArray, float, int]:
     """Information (6, 6) per match that both scans vouch for, residual rms and number of matches.
 
-    It is C - 6 N / sqrt(m), with C the mean of (J_a J_b^T + J_b J_a^T) / 2 over the m matches, and
+    It is C - 4 N / sqrt(m), with C the mean of (J_a J_b^T + J_b J_a^T) / 2 over the m matches, and
     N that of (J_a - J_b) (J_a - J_b)^T / 2, which noise gives. An eigenvalue may be negative.
     Rotation comes before translation, about the middle of the matches, in the axes of i; rotations
     are multiplied by 3 / diameter, so that all entries compare.
