@@ -200,6 +200,8 @@ class FusionConfig(Section):
     """Voxels across the object's diameter, at most."""
     truncation_voxels: float = Field(default=4.0, ge=2)
     """Distance at which the signed distance is cut off."""
+    with_doubtful: bool = False
+    """Whether doubtful scans are part of the model too: they are placed, but may be wrong."""
 
 
 class Config(Section):

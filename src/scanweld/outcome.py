@@ -50,7 +50,7 @@ def conclude(
         scans[scan.name] = _scan_report(
             k, intake, fields, graph, 0 if found is None else len(found.points), config
         )
-    verdict, reasons = _verdict(graph, scans, mesh, facts)
+    verdict, reasons = _verdict(graph, scans, mesh, facts, config)
     return Reconstruction(
         poses=_poses(prepared, graph),
         components=tuple(
@@ -223,6 +223,7 @@ def _verdict(
     scans: Mapping[str, ScanReport],
     mesh: TriangleMesh | None,
     facts: Sequence[FactReport],
+    config: Config,
 ) -> tuple[Verdict, tuple[str, ...]]:
     denied = [
         f"the scans contradict what is given ({fact.fact}): {fact.reason}"
@@ -238,7 +239,8 @@ def _verdict(
     }
     reasons = []
     if by_verdict[ScanVerdict.DOUBTFUL]:
-        reasons.append(f"doubtful: {', '.join(by_verdict[ScanVerdict.DOUBTFUL])}")
+        told = "" if config.fusion.with_doubtful else " (placed, but left out of the model)"
+        reasons.append(f"doubtful: {', '.join(by_verdict[ScanVerdict.DOUBTFUL])}{told}")
     if by_verdict[ScanVerdict.UNPLACED]:
         reasons.append(f"not placed: {', '.join(by_verdict[ScanVerdict.UNPLACED])}")
     if len(graph.components) > 1:

@@ -180,12 +180,16 @@ def check_knowledge(
 def fuse_largest(
     intake: Intake, graph: ViewGraph, config: Config, stages: Stages
 ) -> TriangleMesh | None:
-    """The surface of the largest component, in its world; None without."""
+    """The surface of the largest component's good scans, in its world; None without."""
     if not graph.components:
         return None
     component = graph.components[0]
-    order = sorted(component.poses)
+    left_out = set() if config.fusion.with_doubtful else set(graph.doubts)
+    order = sorted(set(component.poses) - left_out)
     prepared = intake.prepared
+    if not order:
+        logger.warning("no model: all of its scans are doubtful")
+        return None
     world_from_reference = component.world_from_reference(
         prepared[component.reference].scan_from_sensor
     )

@@ -77,6 +77,9 @@ Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random.")]
+WithDoubtful = Annotated[
+    bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Warnings only, no progress.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log.")]
@@ -122,6 +125,7 @@ def run(
     together: Together = None,
     apart: Apart = None,
     turntable: TurntableFlag = False,
+    with_doubtful: WithDoubtful = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -133,6 +137,9 @@ def run(
         unit=None if unit is None else unit.value,
         method=None if method is None else method.value,
     )
+    if with_doubtful:
+        fusion = settings.fusion.model_copy(update={"with_doubtful": True})
+        settings = settings.model_copy(update={"fusion": fusion})
     known = Knowledge(
         fix=tuple(fix or ()),
         start=None if start is None else read_poses(start),
