@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks import trust as command
 from benchmarks.judging import floors as floors_module
 from benchmarks.judging import rivals, trial
 from benchmarks.judging.floors import Floor, floors, names_factor, real_sets
@@ -21,7 +22,7 @@ from benchmarks.judging.measures import (
 )
 from benchmarks.judging.page import Results, page_text
 from benchmarks.judging.table import Runs, outcomes_of
-from benchmarks.judging.tables import floor_table, misses, scenario_table
+from benchmarks.judging.tables import floor_table, kind_table, misses, scenario_table
 from benchmarks.judging.trial import Outcome, PairOutcome, ScanOutcome, judge, try_out
 from benchmarks.paper.study import Record, Study
 from benchmarks.sets import SETS
@@ -277,11 +278,19 @@ def test_failed_runs_are_kept_as_such(
     assert f"**{verdict}**" in misses([outcome])
 
 
-def test_a_run_from_scans_to_outcome():
-    outcome = try_out(SMALL, 0)
-    assert outcome.verdict in ("good", "partial", "doubtful", "nothing")
+def test_the_command_runs_and_does_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    options = ["--only", SMALL, "--seeds", "1", "--jobs", "1", "--out", str(tmp_path / "docs")]
+    options += ["--work", str(tmp_path / "work")]
+    monkeypatch.setattr("sys.argv", ["trust", *options])
+    command.main()
+    page = (tmp_path / "docs/trust.md").read_text(encoding="utf-8")
+    assert f"| {SMALL} | reported | 1 | 6 |" in page
+    (outcome,) = Results(tmp_path / "docs").outcomes
     assert len(outcome.scans) == 6 and len(outcome.pairs) == 15
     assert not any(scan.is_good and scan.is_false for scan in outcome.scans)
+    monkeypatch.setattr("benchmarks.judging.table.try_out", lambda *_: pytest.fail("run again"))
+    command.main()
+    assert (tmp_path / "docs/trust.md").read_text(encoding="utf-8") == page
 
 
 def test_the_worst_condition_is_told():
@@ -295,6 +304,13 @@ def test_the_worst_condition_is_told():
     floor = floor_of([replace(true, scenario="table"), bad], "hard condition")
     assert floor.is_met is False
     assert floor.reached == "least: hand, 67 %; 1 of 2 below"
+
+
+def test_kinds_of_pairs_are_counted():
+    outcomes = [outcome_of(name, told_as_true(scene_of(name))) for name in ("ring of 6", "box")]
+    table = kind_table(outcomes)
+    assert "| good | 25 | 15 | 25 | 10 | 10 |" in table
+    assert "| no overlap | 0 | 0 | 0 | 0 | 0 |" in table
 
 
 def test_real_sets_are_held_to_their_floors():
@@ -349,7 +365,7 @@ def test_the_page_is_that_of_the_results():
 
 def test_the_page_says_what_was_not_measured(tmp_path: Path):
     text = page_text((DOCS / "trust.md").read_text(encoding="utf-8"), Results(tmp_path))
-    assert text.count("Not measured yet.") == 6
+    assert text.count("Not measured yet.") == 7
 
 
 def test_every_floor_of_the_page_stands_in_the_table():

@@ -12,7 +12,7 @@ from benchmarks.judging.measures import brier, calibration_error
 from benchmarks.judging.plots import RELIABILITY, RISK, Stated, draw, stated_pairs, stated_scans
 from benchmarks.judging.rivals import rival_table
 from benchmarks.judging.table import outcomes_of
-from benchmarks.judging.tables import floor_table, misses, scenario_table
+from benchmarks.judging.tables import floor_table, kind_table, misses, scenario_table
 from benchmarks.judging.trial import Outcome
 from benchmarks.paper.pages import markdown_table
 from benchmarks.paper.study import Record, read_records
@@ -124,6 +124,7 @@ BLOCKS: dict[str, Callable[[Results], str]] = {
     "trust-scenarios": lambda results: scenario_table(results.outcomes),
     "trust-confidence": _confidence,
     "trust-rivals": lambda results: rival_table(results.rivals, results.outcomes),
+    "trust-kinds": lambda results: kind_table(results.outcomes),
     "trust-misses": lambda results: misses(results.outcomes),
     "calibration": _calibration,
 }

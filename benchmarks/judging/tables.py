@@ -3,11 +3,12 @@
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from benchmarks.judging.floors import Floor, determined, group_of, scans_of, share
+from benchmarks.judging.floors import Floor, determined, group_of, posed_pairs, scans_of, share
 from benchmarks.judging.trial import CRASH, ERROR, Outcome, ScanOutcome
 from benchmarks.paper.pages import markdown_table
 from benchmarks.virtual.scene import Group
 from scanweld.evaluation.metrics import Standing
+from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import ScanVerdict
 
 HEADINGS = (
@@ -30,6 +31,24 @@ def scenario_table(outcomes: Sequence[Outcome]) -> str:
     return markdown_table(
         HEADINGS, [_row(name, [o for o in outcomes if o.scenario == name]) for name in names]
     )
+
+
+def kind_table(outcomes: Sequence[Outcome]) -> str:
+    """What two scans alone say, and how often they are right; pairs without a pose left out."""
+    pairs = posed_pairs(outcomes)
+    rows = []
+    for kind in PairKind:
+        of = [pair for pair in pairs if pair.kind == kind]
+        accepted = [pair for pair in of if pair.is_accepted]
+        rows.append(
+            (
+                *(str(kind), str(len(of)), str(sum(pair.is_right for pair in of))),
+                *(str(len(accepted)), str(sum(not pair.is_right for pair in accepted))),
+                str(sum(pair.is_open for pair in of)),
+            )
+        )
+    headings = ("kind", "pairs", "right", "accepted", "accepted wrong", "of symmetric objects")
+    return markdown_table(headings, rows)
 
 
 def misses(outcomes: Sequence[Outcome]) -> str:
