@@ -47,7 +47,7 @@ def flying_pixels() -> Disturbance:
         size = principal_diameter(scan.points)
         seen = np.isfinite(depth)
         # A lost return is a gap in the surface, not a look past it.
-        is_past = ~ndimage.binary_closing(seen, np.ones((3, 3)))
+        is_past = np.logical_not(ndimage.binary_closing(seen, np.ones((3, 3))))
         behind = np.where(seen, depth, np.where(is_past, np.nanmax(depth) + 0.3 * size, -np.inf))
         far = ndimage.maximum_filter(behind, size=3)
         near = ndimage.minimum_filter(np.where(seen, depth, np.inf), size=3)
