@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean benchmarks paper trust
+.PHONY: demo test lint clean benchmarks paper trust calibration
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
@@ -33,6 +33,13 @@ paper: $(VENV)/.installed-bench
 # on 2 cores, and goes on where it was stopped. A handful of runs: make trust TRUST="--quick --out trust"
 trust: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.trust --compare $(TRUST)
+
+# The confidence of pairs and scans, into src/scanweld/confidence and docs; on 2 cores a quarter of an
+# hour, and goes on where it was stopped. Only to see that it works:
+# make calibration CALIBRATION="--quick --out calibration"
+calibration: $(VENV)/.installed-bench
+	$(BIN)/python -m benchmarks.calibration $(CALIBRATION)
+	$(BIN)/python -m benchmarks.trust --pages
 
 clean:
 	rm -rf $(VENV) demo

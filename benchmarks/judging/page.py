@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.blocks import rewritten
+from benchmarks.calibration.page import calibration
 from benchmarks.judging.floors import Floor, floors, real_sets
 from benchmarks.judging.measures import brier, calibration_error
 from benchmarks.judging.plots import RELIABILITY, RISK, Stated, draw, stated_pairs, stated_scans
@@ -37,6 +38,11 @@ class Results:
     def document(self) -> dict[str, Any]:
         """What stands beside the runs: the command, the machine."""
         return read_results(self.folder / "data/trust.json")
+
+    @cached_property
+    def calibration(self) -> dict[str, Any]:
+        """What the calibration found."""
+        return read_results(self.folder / "data/calibration.json")
 
     @cached_property
     def outcomes(self) -> list[Outcome]:
@@ -115,10 +121,6 @@ def _numbers(stated: Stated) -> tuple[str, ...]:
     )
 
 
-def _calibration(results: Results) -> str:
-    return NOT_YET
-
-
 BLOCKS: dict[str, Callable[[Results], str]] = {
     "trust-floors": lambda results: _told(results) + floor_table(results.floors),
     "trust-scenarios": lambda results: scenario_table(results.outcomes),
@@ -126,6 +128,6 @@ BLOCKS: dict[str, Callable[[Results], str]] = {
     "trust-rivals": lambda results: rival_table(results.rivals, results.outcomes),
     "trust-kinds": lambda results: kind_table(results.outcomes),
     "trust-misses": lambda results: misses(results.outcomes),
-    "calibration": _calibration,
+    "calibration": lambda results: calibration(results.calibration),
 }
 """Measured part of the page -> what writes it."""

@@ -33,18 +33,23 @@ def stated_scans(outcomes: Sequence[Outcome]) -> Stated:
 
 def draw(outcomes: Sequence[Outcome], folder: Path) -> None:
     """Draw the reliability diagram and the risk-coverage curve into a folder."""
+    stated = {"pairs": stated_pairs(outcomes), "placed scans": stated_scans(outcomes)}
+    draw_stated(stated, folder / RELIABILITY, folder / RISK)
+
+
+def draw_stated(stated: dict[str, Stated], reliability_png: Path, risk_png: Path) -> None:
+    """Draw both of any confidences; they are named as in ``COLORS``."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    stated = {"pairs": stated_pairs(outcomes), "placed scans": stated_scans(outcomes)}
     figure, axes = pyplot.subplots(figsize=(5.2, 4.6))
     _draw_reliability(axes, stated)
-    _save(figure, folder / RELIABILITY)
+    _save(figure, reliability_png)
     figure, axes = pyplot.subplots(figsize=(6.4, 4.2))
     _draw_risk(axes, stated)
-    _save(figure, folder / RISK)
+    _save(figure, risk_png)
     pyplot.close("all")
 
 

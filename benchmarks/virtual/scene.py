@@ -124,7 +124,7 @@ def make_scene(scenario: Scenario, seed: int) -> Scene:
         shots = disturb(shots, rng)
     if scenario.strangers:
         shots = shots + scenario.strangers(seed, rng)
-    return _posed(shots, body, _diameter(body, bare), seed)
+    return posed(shots, body, _diameter(body, bare), seed)
 
 
 def mark_pixels(body: Body, views: Sequence[View]) -> list[int]:
@@ -165,7 +165,7 @@ def _diameter(body: Body, bare: Sequence[Shot]) -> float:
     return min(left, principal_diameter(body.mesh.vertices))
 
 
-def _posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scene:
+def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scene:
     """Shuffle, rename, and move every scan into a random frame."""
     rng = np.random.default_rng([seed, 2])
     of: dict[str, Shot] = {}

@@ -191,6 +191,13 @@ class RefineConfig(Section):
     out."""
 
 
+class ConfidenceConfig(Section):
+    """Evidence -> probability that a pose is right."""
+
+    min_good: float = Field(default=0.3, ge=0, le=1)
+    """Confidence below which a placed scan is doubtful."""
+
+
 class FusionConfig(Section):
     """Posed scans -> one mesh."""
 
@@ -223,6 +230,7 @@ class Config(Section):
     graph: GraphConfig = GraphConfig()
     contours: ContoursConfig = ContoursConfig()
     refine: RefineConfig = RefineConfig()
+    confidence: ConfidenceConfig = ConfidenceConfig()
     fusion: FusionConfig = FusionConfig()
 
     def to_toml(self) -> str:

@@ -1,7 +1,10 @@
 """The end of a run: what became of every scan and pair, and the verdict."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
 
+from scanweld.confidence.assess import Assessed, Confidence
 from scanweld.config import Config
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
@@ -27,12 +30,15 @@ from scanweld.reconstruction import (
     Verdict,
 )
 
+Report = TypeVar("Report", ScanReport, PairReport)
+
 
 def conclude(
     intake: Intake,
     features: Sequence[Features | None],
     fields: Sequence[ScanField],
     graph: ViewGraph,
+    confidence: Confidence,
     mesh: TriangleMesh | None,
     facts: tuple[FactReport, ...],
     config: Config,
@@ -47,9 +53,10 @@ def conclude(
     }
     for k, scan in enumerate(prepared):
         found = features[k]
-        scans[scan.name] = _scan_report(
+        report = _scan_report(
             k, intake, fields, graph, 0 if found is None else len(found.points), config
         )
+        scans[scan.name] = _with_confidence(report, confidence.scans.get(k))
     verdict, reasons = _verdict(graph, scans, mesh, facts, config)
     return Reconstruction(
         poses=_poses(prepared, graph),
@@ -61,7 +68,12 @@ def conclude(
         scans=dict(sorted(scans.items())),
         pairs=tuple(
             sorted(
-                (_pair_report(prepared, graph, edge, config) for edge in graph.pairs),
+                (
+                    _with_confidence(
+                        _pair_report(prepared, graph, edge, config), confidence.pairs.get(edge)
+                    )
+                    for edge in graph.pairs
+                ),
                 key=lambda pair: (pair.i, pair.j),
             )
         ),
@@ -72,6 +84,12 @@ def conclude(
         config=config,
         knowledge=facts,
     )
+
+
+def _with_confidence(report: Report, assessed: Assessed | None) -> Report:
+    if assessed is None:
+        return report
+    return replace(report, confidence=assessed.confidence, grounds=assessed.grounds)
 
 
 def _others(poses: Mapping[int, Pose], reference: int) -> list[int]:

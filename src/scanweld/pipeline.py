@@ -26,6 +26,7 @@ from scanweld.published import reconstruct_as_published
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
 from scanweld.steps import (
+    assess_placed,
     check_knowledge,
     describe_scans,
     fuse_largest,
@@ -88,9 +89,12 @@ def _reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructi
     pairs = _register_pairs(intake, features, fields, contours, config, stages)
     graph = _build_graph(intake, fields, pairs, config, stages)
     graph = _refine(intake, fields, contours, graph, config, stages)
+    graph, confidence = assess_placed(intake, fields, graph, config, stages)
     mesh = fuse_largest(intake, graph, config, stages)
     facts = check_knowledge(intake, fields, graph, config)
-    return conclude(intake, features, fields, graph, mesh, facts, config, stages.reports)
+    return conclude(
+        intake, features, fields, graph, confidence, mesh, facts, config, stages.reports
+    )
 
 
 def _describe(intake: Intake, config: Config, stages: Stages) -> Sequence[Features | None]:

@@ -26,6 +26,7 @@ from scanweld.pairs.verdict import no_pose
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import Stages, work_key
 from scanweld.steps import (
+    assess_placed,
     check_knowledge,
     describe_scans,
     fuse_largest,
@@ -48,9 +49,12 @@ def reconstruct_as_published(intake: Intake, config: Config, stages: Stages) -> 
     pairs = _register_pairs(intake, features, fields, config, stages)
     graph = _choose_adjacent_views(intake, fields, pairs, config, stages)
     graph = _refine(intake, fields, graph, config, stages)
+    graph, confidence = assess_placed(intake, fields, graph, config, stages)
     mesh = fuse_largest(intake, graph, config, stages)
     facts = check_knowledge(intake, fields, graph, config)
-    return conclude(intake, features, fields, graph, mesh, facts, config, stages.reports)
+    return conclude(
+        intake, features, fields, graph, confidence, mesh, facts, config, stages.reports
+    )
 
 
 def _register_pairs(

@@ -54,6 +54,9 @@ class ScanReport:
         overlap: Largest share of its samples that agree with one other placed scan; None if
             unplaced.
         rms: Point-to-plane residual after the joint refinement, in the scans' unit.
+        confidence: Probability that it is placed rightly beside the others of its component; None
+            if unplaced.
+        grounds: What the confidence rests on, see docs/report.md.
     """
 
     verdict: ScanVerdict
@@ -70,6 +73,8 @@ class ScanReport:
     edges: tuple[str, ...] = ()
     overlap: float | None = None
     rms: float | None = None
+    confidence: float | None = None
+    grounds: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -105,6 +110,8 @@ class PairReport:
         observability: Smallest over largest eigenvalue of its information.
         sliding: What the surfaces slide like on each other, if the pair is a sliding one.
         alternatives: All distinct poses kept, best first.
+        confidence: Probability that i_from_j is right; 0 where nothing fits.
+        grounds: What the confidence rests on, see docs/report.md.
     """
 
     i: str
@@ -120,6 +127,8 @@ class PairReport:
     observability: float
     sliding: Slide | None = None
     alternatives: tuple[AlternativeReport, ...] = ()
+    confidence: float = 0.0
+    grounds: Mapping[str, float] = field(default_factory=dict)
 
 
 class FactVerdict(StrEnum):

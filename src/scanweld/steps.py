@@ -4,6 +4,9 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from scanweld.confidence.assess import Confidence, assess
+from scanweld.confidence.model import stored_calibration
+from scanweld.confidence.witnesses import witnesses_of
 from scanweld.config import Config
 from scanweld.errors import InputError
 from scanweld.findings import Outcome, check_facts
@@ -142,6 +145,23 @@ def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:
         for k, estimate in estimate_scales(intake.prepared, component.poses).items()
         if estimate.is_off
     }
+
+
+def assess_placed(
+    intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config, stages: Stages
+) -> tuple[ViewGraph, Confidence]:
+    """How probable it is that each pose is right; scans of which it is too little are doubtful."""
+    judge_pair = pair_judge(fields, intake.diameter, config)
+    with stages.stage("confidence") as counts:
+        witnesses = witnesses_of(intake.prepared, fields, intake.diameter, judge_pair, config)
+        confidence = assess(graph, witnesses, stored_calibration())
+        doubts = dict(graph.doubts)
+        for k, found in confidence.scans.items():
+            if found.confidence < config.confidence.min_good:
+                told = f"its pose is right with a probability of {found.confidence:.0%} only"
+                doubts.setdefault(k, told)
+        counts["doubtful"] = len(doubts)
+    return replace(graph, doubts=doubts), confidence
 
 
 def _common_axis(

@@ -64,6 +64,7 @@ def _pair(pair: PairReport) -> Json:
         "kind": pair.kind.value,
         "accepted": pair.accepted,
         "reason": pair.reason,
+        "confidence": pair.confidence,
         "i_from_j": None if pair.i_from_j is None else _matrix(pair.i_from_j),
         "score": pair.score,
         "overlap": pair.overlap,
@@ -71,6 +72,7 @@ def _pair(pair: PairReport) -> Json:
         "margin": pair.margin,
         "observability": pair.observability,
         "sliding": pair.sliding,
+        "grounds": dict(pair.grounds),
         "alternatives": [
             {"i_from_j": _matrix(other.i_from_j), "score": other.score, "weight": other.weight}
             for other in pair.alternatives

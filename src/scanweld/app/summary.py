@@ -20,6 +20,7 @@ def summary(result: Reconstruction, output: Path) -> str:
     if len(result.components) > 1:
         lines += [f"  component {k + 1}: {', '.join(c)}" for k, c in enumerate(result.components)]
     lines += [f"  {fact.verdict} {fact.fact}: {fact.reason}" for fact in result.knowledge]
+    lines += _least_sure(result)
     if result.poses and result.mesh is None:
         lines.append("  no model: the placed scans could not be fused")
     lines.append(f"  {output}: {', '.join(_files(result))}")
@@ -34,6 +35,12 @@ def sentence(result: Reconstruction) -> str:
     share = f"all {total} scans are" if placed == total else f"{placed} of {total} scans are"
     pieces = len(result.components)
     return f"{share} placed" + (f", in {pieces} separate components" if pieces > 1 else "")
+
+
+def _least_sure(result: Reconstruction) -> list[str]:
+    """The placed scan in whose pose there is least confidence."""
+    known = [(scan.confidence, name) for name, scan in result.scans.items() if scan.confidence]
+    return [f"  least sure {name}: confidence {least:.3f}" for least, name in sorted(known)[:1]]
 
 
 def _in_order(reasons: dict[str, str]) -> list[tuple[str, str]]:

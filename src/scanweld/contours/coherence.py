@@ -25,6 +25,8 @@ from scanweld.geometry.prepared import PreparedScan
 
 COHERENT_PIXELS = 2.0
 """Contours that lie no farther apart in the image than this cohere."""
+NUM_DOUBTED = 20
+"""Contour points that would change a coherence by half."""
 LAST_MATCH_PIXELS = 4.0
 """Farthest contour match of a pose that is nearly right, in footprints of a pixel."""
 MIN_AGREEMENT = 0.5
@@ -87,13 +89,39 @@ def _visible(
 
 def coherence(pairs: Sequence[ContourPair]) -> float:
     """Share of the predicted contour points with an observed one within 2 pixels in the image."""
+    near, total = _coherent(pairs)
+    return near / total if total else 0.0
+
+
+def _coherent(pairs: Sequence[ContourPair]) -> tuple[int, int]:
+    """How many predicted points cohere, and how many there are."""
     near = total = 0
     for pair in pairs:
         total += len(pair.predicted)
         if len(pair.predicted) and len(pair.observed):
             distances, _ = KDTree(pair.observed.pixels).query(pair.predicted.pixels)
             near += int((distances <= COHERENT_PIXELS).sum())
-    return near / total if total else 0.0
+    return near, total
+
+
+def contour_coherence(
+    scans: Sequence[PreparedScan], config: ContoursConfig
+) -> Callable[[int, int, Pose], float]:
+    """The coherence of scans i and j at a pose ``i_from_j``, of both contours in both views.
+
+    Few points say little: so many more, half of which cohere, are counted in.
+    """
+    observed = [observe_contours(scan, config) for scan in scans]
+
+    def cohere(i: int, j: int, i_from_j: Pose) -> float:
+        both = [
+            contour_pair(observed[i], observed[j], i_from_j.inverse(), config),
+            contour_pair(observed[j], observed[i], i_from_j, config),
+        ]
+        near, total = _coherent(both)
+        return (near + 0.5 * NUM_DOUBTED) / (total + NUM_DOUBTED)
+
+    return cohere
 
 
 def outline_matches(pair: ContourPair, camera_j: Camera, radius: float) -> Matches:

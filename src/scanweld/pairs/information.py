@@ -6,6 +6,8 @@ Each match has two normals, one of each scan, with errors of their own: of the p
 of both, only what they have in common is left.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
@@ -18,6 +20,10 @@ NUM_DEVIATIONS = 4.0
 of independent matches; normals are smoothed, so that neighbours have errors in common."""
 TURN_SCALE = 3.0
 """Rotations are multiplied by this over the diameter, so that they compare with translations."""
+
+
+TwoWayMatches = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Points (N, 3) matched between two scans, both unit normals (N, 3), and the distances (N,)."""
 
 
 def information_of(
@@ -37,11 +43,16 @@ def information_of(
         radius: Farthest match, in the scans' unit.
         diameter: Diameter of the run.
     """
-    forward, backward = _matches(j, i, i_from_j, radius), _matches(i, j, i_from_j.inverse(), radius)
-    points = np.concatenate([forward[0], i_from_j.apply(backward[0])])
-    one = np.concatenate([forward[1], i_from_j.turn(backward[1])])
-    other = np.concatenate([forward[2], i_from_j.turn(backward[2])])
-    residuals = np.concatenate([forward[3], backward[3]])
+    return information_from([two_way_matches(i, j, i_from_j, radius)], diameter)
+
+
+def information_from(
+    matches: Sequence[TwoWayMatches], diameter: float
+) -> tuple[FloatArray, float, int]:
+    """The same of any matches in one frame, such as those of one scan on several others."""
+    points, one, other, residuals = (
+        np.concatenate(column) for column in zip(*matches, strict=True)
+    )
     count = len(points)
     if count < MIN_MATCHES:
         return np.zeros((6, 6)), float("nan"), count
@@ -53,9 +64,24 @@ def information_of(
     return information, float(np.sqrt(np.mean(residuals**2))), count
 
 
+def observability_of(information: FloatArray) -> float:
+    """Smallest over largest eigenvalue of an information (6, 6); 0 where that is not positive."""
+    eigenvalues = np.linalg.eigvalsh(information)
+    return float(max(eigenvalues[0], 0.0) / eigenvalues[-1]) if eigenvalues[-1] > 0 else 0.0
+
+
+def two_way_matches(i: ScanField, j: ScanField, i_from_j: Pose, radius: float) -> TwoWayMatches:
+    """Matches of the samples of each scan on the other, in the frame of i."""
+    points, one, other, residuals = _matches(i, j, i_from_j.inverse(), radius)
+    backward = i_from_j.apply(points), i_from_j.turn(one), i_from_j.turn(other), residuals
+    both = zip(_matches(j, i, i_from_j, radius), backward, strict=True)
+    points, one, other, residuals = (np.concatenate(column) for column in both)
+    return points, one, other, residuals
+
+
 def _matches(
     source: ScanField, target: ScanField, target_from_source: Pose, radius: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> TwoWayMatches:
     """Samples of the source on the target, both normals (N, 3) and the distance, target frame."""
     points = target_from_source.apply(source.points)
     normals = target_from_source.turn(source.normals)

@@ -4,6 +4,7 @@ import numpy as np
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
+from scanweld.pairs.information import observability_of
 from scanweld.pairs.result import Alternative, PairKind, PairResult, margin_over
 from scanweld.pairs.slippage import Slippage, slide_words, slippage_of
 from scanweld.pairs.symmetry import Symmetry
@@ -32,10 +33,6 @@ def classify_pair(
         symmetry: What the best pose and its rivals have in common; None without a rival.
         config: Settings.
     """
-    eigenvalues = np.linalg.eigvalsh(information)
-    observability = (
-        float(max(eigenvalues[0], 0.0) / eigenvalues[-1]) if eigenvalues[-1] > 0 else 0.0
-    )
     scores = [alternative.score for alternative in alternatives]
     margin = margin_over(scores[0], scores[1:]) if scores else 0.0
     sliding = slippage_of(information, config.min_observability)
@@ -47,7 +44,7 @@ def classify_pair(
         reason=reason,
         alternatives=alternatives,
         information=information,
-        observability=observability,
+        observability=observability_of(information),
         margin=margin,
         rms=rms,
         sliding=sliding if kind is PairKind.SLIDING else None,

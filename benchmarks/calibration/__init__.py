@@ -1,0 +1,1 @@
+"""Calibration of the confidence: virtual sets of made objects -> calibration.json."""

@@ -1,0 +1,111 @@
+"""Run the main job on the sets of the calibration, and hold all poses that it names to the truth.
+
+The sets are a table of ``benchmarks.paper.study``, which keeps what is finished.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.calibration.scenes import make_set
+from benchmarks.judging.trial import is_right_pair
+from benchmarks.paper.study import Record, Result, Unit
+from benchmarks.virtual.scene import Scene
+from scanweld.config import Config, FusionConfig
+from scanweld.errors import ScanweldError
+from scanweld.geometry.pose import Pose
+from scanweld.pipeline import run
+from scanweld.reconstruction import PairReport, Reconstruction
+
+CODE = (
+    "src/scanweld/**/*.py",
+    "benchmarks/virtual/*.py",
+    "benchmarks/judging/trial.py",
+    *(f"benchmarks/calibration/{name}.py" for name in ("solids", "scenes", "collect")),
+)
+"""Sets that other code measured are measured again."""
+CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
+"""The defaults; nobody looks at the model."""
+NUM_SETS, NUM_QUICK = 200, 6
+
+
+@dataclass(kw_only=True)
+class Sets:
+    """The sets by seed."""
+
+    num_sets: int = NUM_SETS
+    NAME: str = "calibration"
+    TITLE: str = "Calibration of the confidence"
+
+    def units(self, quick: bool) -> list[Unit]:
+        """All sets; a few if quick."""
+        return [{"seed": seed} for seed in range(NUM_QUICK if quick else self.num_sets)]
+
+    def measure(self, unit: Unit) -> Result:
+        """Grounds of every pair and scan of a set that has a pose, and whether it is right."""
+        scene = make_set(unit["seed"])
+        try:
+            found = run(scene.scans, CONFIG, workers=1)
+        except ScanweldError as error:
+            return {"error": str(error), "pairs": [], "scans": []}
+        return {
+            "pairs": [_pair(pair, scene) for pair in found.pairs if pair.i_from_j is not None],
+            "scans": _scans(found, scene),
+        }
+
+    def page(self, records: Sequence[Record], out: Path) -> str:
+        """Nothing: the page is written by its blocks."""
+        return ""
+
+
+def _pair(pair: PairReport, scene: Scene) -> dict[str, Any]:
+    assert pair.i_from_j is not None
+    return {
+        "i": pair.i,
+        "j": pair.j,
+        "kind": str(pair.kind),
+        "accepted": pair.accepted,
+        "grounds": dict(pair.grounds),
+        "right": _is_right(pair.i, pair.j, pair.i_from_j, scene),
+    }
+
+
+def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
+    """Placed scans. Right are the most that agree with each other, if they are two or more."""
+    records = []
+    for number, component in enumerate(found.components):
+        core = _largest_agreeing(found, component, scene)
+        records += [
+            {
+                "name": name,
+                "component": number,
+                "reference": name == component[0],
+                "grounds": dict(found.scans[name].grounds),
+                "right": name in core,
+            }
+            for name in component
+        ]
+    return records
+
+
+def _largest_agreeing(
+    found: Reconstruction, component: Sequence[str], scene: Scene
+) -> frozenset[str]:
+    """The most scans of a component that are right as one of them sees it; none if it is alone."""
+
+    def right_beside(i: str) -> frozenset[str]:
+        from_world = found.poses[i].inverse()
+        return frozenset(
+            j for j in component if j != i and _is_right(i, j, from_world @ found.poses[j], scene)
+        )
+
+    largest = max(component, key=lambda i: len(right_beside(i)))
+    beside = right_beside(largest)
+    return beside | {largest} if beside else frozenset()
+
+
+def _is_right(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool:
+    """Whether a pose is the true one, and what the two scans show determines it."""
+    is_open = bool({i, j} & scene.is_open)
+    return not is_open and is_right_pair(i, j, i_from_j, scene)

@@ -1,0 +1,112 @@
+"""Records of all sets -> calibration, and what it says of objects that it has not seen."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.calibration.fit import Examples, fit, held_out_probabilities, make_examples
+from benchmarks.paper.study import Record
+from scanweld.confidence.assess import as_tied, close_open
+from scanweld.confidence.links import links
+from scanweld.confidence.model import Calibration
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.multiview.view_graph import Component
+from scanweld.pairs.result import PairKind
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Learned:
+    """What all sets together say.
+
+    Attributes:
+        calibration: The models.
+        pairs: Examples of pairs,
+        scans: of scans, with the held-out confidences of their pairs in their links.
+        pair_confidence: (N,) held-out confidence of the pairs,
+        scan_confidence: (M,) of the scans.
+    """
+
+    calibration: Calibration
+    pairs: Examples
+    scans: Examples
+    pair_confidence: FloatArray
+    scan_confidence: FloatArray
+
+
+def learn(records: Sequence[Record], command: str) -> Learned:
+    """Fit both models, first the pairs': the scans' rests on it.
+
+    Args:
+        records: Of ``Sets``.
+        command: That collected them.
+    """
+    rows = [(record.unit["seed"], pair) for record in records for pair in record.result["pairs"]]
+    pairs = make_examples(
+        [pair["grounds"] for _, pair in rows],
+        [pair["right"] for _, pair in rows],
+        [seed for seed, _ in rows],
+    )
+    probability = held_out_probabilities(pairs)
+    pair_confidence = np.array(
+        [
+            close_open(float(p), PairKind(pair["kind"]), pair["grounds"])
+            for p, (_, pair) in zip(probability, rows, strict=True)
+        ]
+    )
+    scans = _scan_examples(records, pair_confidence)
+    digest = hashlib.sha256(json.dumps([record.result for record in records]).encode())
+    made = {
+        "command": command,
+        "sets": len(records),
+        "pairs": len(pairs),
+        "scans": len(scans),
+        "digest": digest.hexdigest()[:16],
+    }
+    tied = scans.grounds[:, scans.names.index("link")]
+    alone = held_out_probabilities(scans)
+    return Learned(
+        calibration=Calibration(pair=fit(pairs), scan=fit(scans), made=made),
+        pairs=pairs,
+        scans=scans,
+        pair_confidence=pair_confidence,
+        scan_confidence=np.array(
+            [as_tied(p, link) for p, link in zip(alone.tolist(), tied.tolist(), strict=True)]
+        ),
+    )
+
+
+def _scan_examples(records: Sequence[Record], pair_confidence: FloatArray) -> Examples:
+    left = iter(pair_confidence.tolist())
+    rows: list[tuple[dict[str, float], bool, int]] = []
+    for record in records:
+        confidence = {(p["i"], p["j"]): next(left) for p in record.result["pairs"]}
+        accepted = {(p["i"], p["j"]) for p in record.result["pairs"] if p["accepted"]}
+        tied = _links(record.result["scans"], {edge: confidence[edge] for edge in accepted})
+        rows += [
+            ({**scan["grounds"], "link": tied[scan["name"]]}, scan["right"], record.unit["seed"])
+            for scan in record.result["scans"]
+        ]
+    return make_examples(*zip(*rows, strict=True))
+
+
+def _links(
+    scans: Sequence[Mapping[str, Any]], confidence: Mapping[tuple[str, str], float]
+) -> dict[str, float]:
+    """The links of a set's scans, by name, for these confidences of its accepted pairs."""
+    names = sorted(scan["name"] for scan in scans)
+    at = {name: k for k, name in enumerate(names)}
+    tied: dict[str, float] = {}
+    for number in {scan["component"] for scan in scans}:
+        of = [scan for scan in scans if scan["component"] == number]
+        component = Component(
+            poses={at[scan["name"]]: Pose.identity() for scan in of},
+            reference=next(at[scan["name"]] for scan in of if scan["reference"]),
+        )
+        numbered = {(at[i], at[j]): p for (i, j), p in confidence.items() if i in at and j in at}
+        tied.update({names[k]: link for k, link in links(component, numbered).items()})
+    return tied

@@ -1,0 +1,1 @@
+"""Evidence to confidence: how probable it is that a pose is right."""

@@ -1,0 +1,109 @@
+"""What a confidence rests on: named numbers on a pair and on a scan, more of each is better.
+
+All are free of units and frames.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from scanweld.confidence.joint_evidence import JointEvidence
+from scanweld.confidence.witnesses import Looks
+from scanweld.pairs.result import Alternative, Evidence, PairResult, margin_over
+
+Grounds = Mapping[str, float]
+
+LEAST_SHARE = 1e-3
+LEAST_OBSERVABILITY = 1e-7
+MAX_MISFIT = 2.0
+MIN_SUPPORT = 0.02
+"""Conductance between two scans below which other pairs do not hold them together."""
+
+
+def pair_grounds(
+    result: PairResult,
+    chosen: Alternative,
+    looks: Looks,
+    joint: JointEvidence | None,
+    is_accepted: bool,
+) -> Grounds:
+    """Grounds to believe one pose of a pair.
+
+    Where the rest of the graph holds both scans without this pair, what it says of their places
+    counts if it is more than what the two scans say alone: a third scan may decide.
+
+    Args:
+        result: The pair.
+        chosen: The pose.
+        looks: How the two scans lie on each other in it.
+        joint: The component that both scans are in, if they are in one.
+        is_accepted: Whether the pose agrees with the component's.
+    """
+    observability = looks.observability
+    margin = margin_over(chosen.score, [a.score for a in result.alternatives if a is not chosen])
+    support = opposition = consent = 0.0
+    if joint is not None and not is_accepted:
+        opposition = -joint.conductance[result.i, result.j]
+    if joint is not None and is_accepted:
+        support = joint.support_besides((result.i, result.j), chosen.score)
+        consent = -max(violated(joint.said_of(k)) for k in (result.i, result.j))
+        if is_supported(support):
+            both = result.i, result.j
+            margin = max(margin, min(joint.margins[k] for k in both))
+            observability = max(observability, min(joint.looks[k].observability for k in both))
+    return {
+        **_of_evidence(chosen.evidence),
+        "margin": max(margin, -1.0),
+        "observability": float(np.log10(max(observability, LEAST_OBSERVABILITY))),
+        "coherence": looks.coherence,
+        "residual": -looks.residual,
+        "misfit": -min(looks.misfit, MAX_MISFIT),
+        "support": support,
+        "opposition": opposition,
+        "consent": consent,
+    }
+
+
+def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) -> Grounds:
+    """Grounds to believe the place of a scan in its component.
+
+    Args:
+        k: The scan.
+        joint: Its component.
+        link: How surely pairs tie it to the reference scan.
+        coherence: The best contour coherence of its accepted pairs.
+    """
+    said, looks = joint.said_of(k), joint.looks[k]
+    agree = sum(e.agree for e in said)
+    return {
+        "agree": float(np.log10(max(agree, LEAST_SHARE))),
+        "consent": -violated(said),
+        "free": -sum(e.free for e in said) / max(agree, LEAST_SHARE),
+        "margin": joint.margins[k],
+        "observability": float(np.log10(max(looks.observability, LEAST_OBSERVABILITY))),
+        "coherence": coherence,
+        "residual": -looks.residual,
+        "misfit": -min(looks.misfit, MAX_MISFIT),
+        "link": link,
+    }
+
+
+def is_supported(support: float) -> bool:
+    """Whether other accepted pairs hold the two scans of a pair together."""
+    return support > MIN_SUPPORT
+
+
+def violated(said: list[Evidence]) -> float:
+    """Samples that other sensors contradict, as a share of those that agree."""
+    agree = sum(e.agree for e in said)
+    return sum(e.surface_violation for e in said) / max(agree, LEAST_SHARE)
+
+
+def _of_evidence(evidence: Evidence) -> dict[str, float]:
+    agree = max(evidence.agree, LEAST_SHARE)
+    return {
+        "agree": float(np.log10(agree)),
+        "front": -evidence.front / agree,
+        "contradict": -evidence.contradict / agree,
+        "free": -evidence.free / agree,
+    }

@@ -1,0 +1,132 @@
+"""What all scans of a component say together: of each scan's place, and of each pair's pose."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from scanweld.confidence.misfit import misfit, two_way_misfits
+from scanweld.confidence.witnesses import Looks, Witnesses, over
+from scanweld.geometry.pose import Pose
+from scanweld.multiview.merge import Merge, Poses, is_near, propose_merges
+from scanweld.multiview.view_graph import Component, Edge, ViewGraph
+from scanweld.pairs.information import information_from, observability_of, two_way_matches
+from scanweld.pairs.register import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
+from scanweld.pairs.result import Evidence, margin_over
+
+MIN_CONDUCTANCE = 0.02
+"""Accepted pairs conduct by their score, and none less than this."""
+LEAK = 1e-6
+"""Conductance between any two scans, so that it is defined between those that no pair joins."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class JointEvidence:
+    """A component looked at as a whole.
+
+    Attributes:
+        between: Evidence on all pairs (i, j), i < j, at the component's poses.
+        margins: For each scan, the share of the score of its place by which that beats the best
+            distinct place that any pair proposes for it, as all others judge it.
+        looks: How each scan lies on all others together; their coherence is left to pairs.
+        conductance: Between any two scans through accepted pairs, each of which conducts by its
+            score: a short way, a strong way and many ways are all better.
+    """
+
+    between: Mapping[Edge, Evidence]
+    margins: Mapping[int, float]
+    looks: Mapping[int, Looks]
+    conductance: Mapping[Edge, float]
+
+    def support_besides(self, edge: Edge, score: float) -> float:
+        """Conductance between the scans of an accepted pair of that score without the pair."""
+        return max(self.conductance[edge] - max(score, MIN_CONDUCTANCE), 0.0)
+
+    def said_of(self, scan: int) -> list[Evidence]:
+        """The evidence between a scan and each other one."""
+        return _said_of(scan, self.between)
+
+
+def joint_evidence(graph: ViewGraph, component: Component, witnesses: Witnesses) -> JointEvidence:
+    """Ask all scans of a component about each of them.
+
+    Args:
+        graph: The view graph.
+        component: One of its components.
+        witnesses: All scans of the run.
+    """
+    poses = component.poses
+    between = {
+        (i, j): witnesses.judge(i, j, poses[i].inverse() @ poses[j])
+        for i, j in combinations(sorted(poses), 2)
+    }
+    return JointEvidence(
+        between=between,
+        margins={k: _margin(k, graph, poses, between, witnesses) for k in sorted(poses)},
+        looks={k: _looks(k, poses, witnesses) for k in sorted(poses)},
+        conductance=_conductance(graph, component),
+    )
+
+
+def _margin(
+    k: int, graph: ViewGraph, poses: Poses, between: Mapping[Edge, Evidence], witnesses: Witnesses
+) -> float:
+    """The margin of a scan's place over other places, all other scans being where they are."""
+    others = {m: pose for m, pose in poses.items() if m != k}
+    centres = [field.centre for field in witnesses.fields]
+    near = (RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS * witnesses.diameter)
+    alone = {k: Pose.identity()}
+    merges = propose_merges(others, alone, graph.pairs, centres, near, witnesses.judge)
+    rivals = [m.score for m in merges if not is_near(m.a_from_b, poses[k], centres[k], near)]
+    said = _said_of(k, between)
+    here = Merge(
+        a_from_b=poses[k],
+        supports=(),
+        agree=sum(e.agree for e in said),
+        violated=sum(e.surface_violation for e in said),
+        free=sum(e.free for e in said),
+        worst=0.0,
+    )
+    return max(margin_over(here.score, rivals), -1.0)
+
+
+def _said_of(scan: int, between: Mapping[Edge, Evidence]) -> list[Evidence]:
+    return [evidence for edge, evidence in between.items() if scan in edge]
+
+
+def _looks(k: int, poses: Poses, witnesses: Witnesses) -> Looks:
+    """How a scan lies on all others together."""
+    fields, sources = witnesses.fields, witnesses.sources
+    tolerance, diameter = witnesses.tolerance, witnesses.diameter
+    k_from = {m: poses[k].inverse() @ pose for m, pose in sorted(poses.items()) if m != k}
+    found = [two_way_matches(fields[k], fields[m], pose, tolerance) for m, pose in k_from.items()]
+    information, rms, _ = information_from(found, diameter)
+    patches = [
+        two_way_misfits(sources[k], sources[m], pose, tolerance, diameter)
+        for m, pose in k_from.items()
+    ]
+    return Looks(
+        observability=observability_of(information),
+        residual=over(rms, tolerance),
+        misfit=misfit(np.concatenate(patches)) / tolerance,
+        coherence=0.0,
+    )
+
+
+def _conductance(graph: ViewGraph, component: Component) -> dict[Edge, float]:
+    """Effective conductance between all pairs of scans: 1 / (e_i - e_j)^T L^+ (e_i - e_j)."""
+    scans = sorted(component.poses)
+    at = {k: n for n, k in enumerate(scans)}
+    laplacian = LEAK * (len(scans) * np.eye(len(scans)) - 1.0)
+    for (i, j), option in graph.accepted.items():
+        if i in at and j in at:
+            a, b = at[i], at[j]
+            conducts = max(option.score, MIN_CONDUCTANCE)
+            laplacian[[a, b], [a, b]] += conducts
+            laplacian[[a, b], [b, a]] -= conducts
+    inverse = np.linalg.pinv(laplacian, hermitian=True)
+    return {
+        (i, j): 1.0 / float(inverse[a, a] + inverse[b, b] - 2 * inverse[a, b])
+        for (i, a), (j, b) in combinations(at.items(), 2)
+    }

@@ -1,0 +1,118 @@
+"""The calibration command: objects that can be scanned, fits that find what is known, and a run."""
+
+import numpy as np
+import pytest
+
+from benchmarks.calibration.fit import count_frequencies, fit, held_out_probabilities, make_examples
+from benchmarks.calibration.learn import learn
+from benchmarks.calibration.page import calibration
+from benchmarks.calibration.report import measures
+from benchmarks.calibration.scenes import make_set
+from benchmarks.calibration.solids import ODDS, SOLIDS, make_solid
+from benchmarks.judging.measures import calibration_error
+from benchmarks.paper.study import Record
+from benchmarks.paper.success import auc
+from scanweld.confidence.model import read_calibration
+from scanweld.geometry.arrays import BoolArray, FloatArray
+
+
+@pytest.mark.parametrize("family", SOLIDS)
+def test_solids_face_outwards_and_differ_by_seed(family: str):
+    a, b = (make_solid(family, seed).mesh for seed in (0, 1))
+    corners = a.vertices[a.faces]
+    volume = np.einsum("nk,nk->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert volume > 1000
+    assert a.vertices.shape != b.vertices.shape or not np.allclose(a.vertices, b.vertices)
+    assert make_solid(family, 0).mesh.vertices.tobytes() == a.vertices.tobytes()
+
+
+def test_each_family_has_its_odds():
+    assert len(ODDS) == len(SOLIDS) and sum(ODDS) == pytest.approx(1)
+
+
+def test_scenes_repeat_themselves():
+    a, b = make_set(3), make_set(3)
+    assert [scan.points.tobytes() for scan in a.scans] == [s.points.tobytes() for s in b.scans]
+    assert 3 <= len(a.scans) <= 6
+
+
+def known(count: int, seed: int) -> tuple[list[dict[str, float]], FloatArray, BoolArray]:
+    """Examples whose probability is known: one ground tells, one is idle, one misleads."""
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(count, 3))
+    probability = 1 / (1 + np.exp(-2.5 * x[:, 0] + 0.7 * x[:, 2]))
+    rows = [{"tells": a, "idle": b, "against": c} for a, b, c in x.tolist()]
+    return rows, probability, rng.random(count) < probability
+
+
+def test_the_fit_finds_probabilities_that_are_known():
+    rows, _, is_right = known(4000, 0)
+    model = fit(make_examples(rows, is_right.tolist(), list(range(4000))))
+    seen, probability, came = known(4000, 1)
+    said = np.array([model.probability(row) for row in seen])
+    # What tells the wrong way cannot be used: a model must not doubt what looks better.
+    assert np.ptp(model.curves["against"].values) < 0.3
+    assert np.ptp(model.curves["idle"].values) < 0.5 < 3 < np.ptp(model.curves["tells"].values)
+    assert calibration_error(said.tolist(), came.tolist()) < 0.03
+    assert np.corrcoef(said, probability)[0, 1] > 0.9
+
+
+def test_held_out_probabilities_know_nothing_of_their_set():
+    """Grounds that are only a set's number, and sets that are all right or all wrong."""
+    rng = np.random.default_rng(0)
+    groups = np.repeat(np.arange(40), 10)
+    is_right = (rng.random(40) < 0.5)[groups]
+    rows = [{"number": float(g), "noise": float(rng.normal())} for g in groups]
+    said = held_out_probabilities(make_examples(rows, is_right.tolist(), groups.tolist()))
+    assert auc(said.tolist(), is_right.tolist()) < 0.65
+
+
+def test_few_examples_do_not_make_certain():
+    totals, all_right = np.arange(30.0), np.ones(30, dtype=bool)
+    frequencies = count_frequencies(totals, all_right)
+    assert frequencies.values.max() == pytest.approx(31 / 32)
+    assert frequencies.values.min() > 0.5
+    mixed = count_frequencies(np.arange(200.0), np.arange(200) >= 100)
+    assert mixed.values[0] < 0.02 and mixed.values[-1] > 0.98
+
+
+def made_record(seed: int) -> Record:
+    """A set of three scans: two pairs right, one wrong; or of a stranger, all wrong."""
+    rng = np.random.default_rng(seed)
+    is_right = bool(rng.random() < 0.6)
+    pairs = [
+        {
+            "i": i,
+            "j": j,
+            "kind": "good",
+            "accepted": k < 2,
+            "grounds": {"agree": float(rng.normal(2.0 * (k < 2 and is_right))), "support": 0.0},
+            "right": bool(k < 2 and is_right),
+        }
+        for k, (i, j) in enumerate((("a", "b"), ("b", "c"), ("a", "c")))
+    ]
+    scans = [
+        {
+            "name": name,
+            "component": 0,
+            "reference": name == "b",
+            "grounds": {"margin": float(rng.normal(2.0 * is_right)), "link": 0.0},
+            "right": is_right,
+        }
+        for name in "abc"
+    ]
+    return Record(unit={"seed": seed}, result={"pairs": pairs, "scans": scans})
+
+
+def test_scans_learn_from_the_confidence_of_their_pairs():
+    learned = learn([made_record(seed) for seed in range(150)], "the command")
+    assert len(learned.pairs) == len(learned.scans) == 450
+    links = learned.scans.grounds[:, learned.scans.names.index("link")]
+    assert links[learned.scans.is_right].mean() > links[~learned.scans.is_right].mean() + 0.3
+    assert auc(learned.pair_confidence.tolist(), learned.pairs.is_right.tolist()) > 0.85
+    assert auc(learned.scan_confidence.tolist(), learned.scans.is_right.tolist()) > 0.9
+    again = read_calibration(learned.calibration.to_json())
+    assert again.made["sets"] == 150 and again.made["command"] == "the command"
+    text = calibration(measures(learned))
+    assert "`the command`" in text and "150 sets" in text
+    assert "Of the pairs have a confidence from 0.5 on" in text
