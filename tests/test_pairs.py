@@ -95,6 +95,18 @@ def test_alternatives_are_distinct_and_in_order():
             assert apart.angle_deg() > 11 or shift > 0.05
 
 
+def test_an_answer_is_no_rival_of_itself():
+    """A refinement from afar brings both of the best poses to the truth."""
+    pair = creature_pair(30)
+    anchors = [(even_anchors(pair.fields[0], 64), even_anchors(pair.fields[1], 64))]
+    result = register_pair(
+        0, 1, *pair.fields, anchors, pair.diameter, CONFIG, polish=lambda pose: pair.i_from_j
+    )
+    errors = [pair.off_by(option.i_from_j) for option in result.alternatives]
+    assert sum(degrees < 12 and shift < 0.06 for degrees, shift in errors) == 1
+    assert result.kind is PairKind.GOOD and result.margin > CONFIG.min_margin
+
+
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "plate"])
 @pytest.mark.parametrize("other", [1, 2])
 def test_surfaces_that_slide_or_repeat_are_never_good(name: str, other: int):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from scanweld.config import PairsConfig
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import ScanField
@@ -85,6 +85,10 @@ def register_pair(
     alternatives = _ranked([alternative_at(field_i, field_j, to_pose(row), fine) for row in poses])
     if polish is not None:
         alternatives = _ranked(_polished(field_i, field_j, alternatives, polish, fine))
+        # Two that were distinct may have come to the same: an answer is no rival of itself.
+        rows = pose_rows([option.i_from_j for option in alternatives])
+        kept = _distinct_at(rows, field_j, diameter, len(rows), rivals=True)
+        alternatives = [alternatives[k] for k in kept]
     if start is not None:
         given = _from_start(field_i, field_j, start, diameter, fine, polish)
         alternatives = _with_given(alternatives, given, field_j, diameter)
@@ -206,9 +210,15 @@ def score_poses(
 def _distinct(
     poses: FloatArray, j: ScanField, diameter: float, count: int, *, rivals: bool = False
 ) -> FloatArray:
+    return poses[_distinct_at(poses, j, diameter, count, rivals=rivals)]
+
+
+def _distinct_at(
+    poses: FloatArray, j: ScanField, diameter: float, count: int, *, rivals: bool
+) -> IntArray:
     angle = np.radians(RIVAL_ANGLE_DEG if rivals else SAME_ANGLE_DEG)
     shift = (RIVAL_SHIFT_DIAMETERS if rivals else SAME_SHIFT_DIAMETERS) * diameter
-    return poses[distinct_poses(poses, j.centre, angle, shift, count)]
+    return distinct_poses(poses, j.centre, angle, shift, count)
 
 
 def result_of(
