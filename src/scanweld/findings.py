@@ -13,8 +13,7 @@ from scanweld.multiview.merge import Judge
 from scanweld.multiview.turntable import MIN_SCANS, Turntable, turning_pairs
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.register import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
-from scanweld.pairs.result import PairKind
-from scanweld.pairs.verdict import MIN_AGREE
+from scanweld.pairs.result import MIN_AGREE, PairKind
 from scanweld.reconstruction import FactReport, FactVerdict
 
 MAX_NAMED = 5

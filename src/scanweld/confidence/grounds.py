@@ -9,7 +9,7 @@ import numpy as np
 
 from scanweld.confidence.joint_evidence import JointEvidence
 from scanweld.confidence.witnesses import Looks
-from scanweld.pairs.result import Alternative, Evidence, PairResult, margin_over
+from scanweld.pairs.result import Alternative, Evidence, PairResult, margin_among
 
 Grounds = Mapping[str, float]
 
@@ -40,7 +40,7 @@ def pair_grounds(
         is_accepted: Whether the pose agrees with the component's.
     """
     observability = looks.observability
-    margin = margin_over(chosen.score, [a.score for a in result.alternatives if a is not chosen])
+    margin = margin_among(chosen, result.alternatives)
     support = opposition = consent = 0.0
     if joint is not None and not is_accepted:
         opposition = -joint.conductance[result.i, result.j]

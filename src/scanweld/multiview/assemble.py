@@ -19,8 +19,7 @@ from scanweld.multiview.merge import (
     without,
 )
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
-from scanweld.pairs.result import Alternative, PairKind, PairResult
-from scanweld.pairs.verdict import MIN_AGREE
+from scanweld.pairs.result import MIN_AGREE, Alternative, PairKind, PairResult
 
 logger = logging.getLogger(__name__)
 

@@ -17,6 +17,13 @@ CONTRADICT_WEIGHT = 1.5
 """Samples with other normals say less: at edges normals are poor."""
 FREE_WEIGHT = 1.0 / 3.0
 """Samples in free space say less still: real silhouettes have gaps."""
+MIN_AGREE = 0.05
+"""Share of agreeing samples below which two scans do not overlap."""
+CLEAN_SHARE, AS_CLEAN = 0.15, 1.3
+"""A rival is contradicted no more than a pose if its violations, as a share of what agrees, are
+within the first, or within so many times those of the pose."""
+MIN_RIVAL_SHARE = 0.15
+"""Least agreement of such a rival, as a share of that of the pose: slivers fit in many ways."""
 
 
 MARGIN_WEIGHT = 2.0
@@ -80,6 +87,19 @@ def margin_over(score: float, rivals: Sequence[float]) -> float:
     return min(1.0, (score - max(rivals)) / score) if rivals else 1.0
 
 
+def rival_score(rival: Evidence, best: Evidence) -> float:
+    """What a pose scores as a rival of another one of the same two scans.
+
+    A rival that is contradicted no more explains the scans as well, if they overlap less in it:
+    on a symmetric object the next turn does. It counts as if it overlapped as much.
+    """
+    bearable = max(CLEAN_SHARE, AS_CLEAN * best.violation / max(best.agree, MIN_AGREE))
+    is_seen = rival.agree >= max(MIN_AGREE, MIN_RIVAL_SHARE * best.agree)
+    if not is_seen or rival.violation > bearable * rival.agree:
+        return rival.score
+    return rival.score * max(1.0, best.agree / rival.agree)
+
+
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Alternative:
     """A pose of a pair with its evidence. The frames are those of the result it belongs to.
@@ -133,6 +153,12 @@ def weights_of(
     step = max(min_margin * max(scores.max(), min_score), np.finfo(float).eps)
     weights = np.exp(MARGIN_WEIGHT * (scores - scores.max()) / step)
     return tuple((weights / weights.sum()).tolist())
+
+
+def margin_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> float:
+    """Margin of one of a pair's poses over the others."""
+    others = [option.evidence for option in alternatives if option is not chosen]
+    return margin_over(chosen.score, [rival_score(other, chosen.evidence) for other in others])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

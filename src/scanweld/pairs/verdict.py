@@ -5,12 +5,9 @@ import numpy as np
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.information import observability_of
-from scanweld.pairs.result import Alternative, PairKind, PairResult, margin_over
+from scanweld.pairs.result import MIN_AGREE, Alternative, PairKind, PairResult, margin_among
 from scanweld.pairs.slippage import Slippage, slide_words, slippage_of
 from scanweld.pairs.symmetry import Symmetry
-
-MIN_AGREE = 0.05
-"""Share of agreeing samples below which two scans do not overlap."""
 
 
 def classify_pair(
@@ -33,8 +30,7 @@ def classify_pair(
         symmetry: What the best pose and its rivals have in common; None without a rival.
         config: Settings.
     """
-    scores = [alternative.score for alternative in alternatives]
-    margin = margin_over(scores[0], scores[1:]) if scores else 0.0
+    margin = margin_among(alternatives[0], alternatives) if alternatives else 0.0
     sliding = slippage_of(information, config.min_observability)
     kind, reason = _kind(alternatives, sliding, margin, symmetry, config)
     return PairResult(

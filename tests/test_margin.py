@@ -1,0 +1,66 @@
+"""Margins over rivals: what counts is how well these explain the scans, not how far they meet."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scanweld.config import PairsConfig
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.result import Alternative, Evidence, PairKind, margin_among
+from scanweld.pairs.verdict import classify_pair
+from tests.results import turned
+
+
+def evidence(agree: float, front: float = 0.0, free: float = 0.0) -> Evidence:
+    left = 1.0 - agree - front - free
+    return Evidence(agree=agree, front=front, contradict=0.0, free=free, occluded=left, unknown=0.0)
+
+
+def margin(best: Evidence, rivals: list[Evidence]) -> float:
+    options = [Alternative(i_from_j=turned(k), evidence=e) for k, e in enumerate([best, *rivals])]
+    return margin_among(options[0], options)
+
+
+def test_a_rival_that_nothing_contradicts_is_as_good_though_it_overlaps_less():
+    """The next turn of a toothed wheel: fewer teeth meet, and all that meet fit."""
+    assert margin(evidence(0.9, front=0.005), [evidence(0.5, front=0.003)]) < 0.05
+    assert margin(evidence(0.9), [evidence(0.2)]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_rival_that_is_contradicted_counts_by_its_score():
+    best, rival = evidence(0.6, front=0.01), evidence(0.5, front=0.1, free=0.1)
+    assert margin(best, [rival]) == pytest.approx((best.score - rival.score) / best.score)
+
+
+def test_slivers_are_no_rivals():
+    best = evidence(0.6, front=0.01)
+    assert margin(best, [evidence(0.04)]) > 0.9
+    assert margin(best, [evidence(0.08)]) > 0.8
+    assert margin(evidence(0.2), [evidence(0.06)]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_rival_as_dirty_as_the_best_pose_counts_in_full():
+    best, rival = evidence(0.8, free=0.2), evidence(0.4, free=0.11)
+    assert margin(best, [rival]) < 0.1
+
+
+def test_without_rivals_the_margin_is_full_and_without_a_score_none():
+    assert margin(evidence(0.3), []) == 1.0
+    assert margin(evidence(0.1, front=0.2), []) == 0.0
+
+
+@given(st.floats(0.06, 1.0), st.floats(0.01, 1.0), st.floats(0, 0.3), st.floats(0, 0.3))
+def test_one_more_rival_never_makes_a_pose_surer(a: float, b: float, front: float, free: float):
+    best, first = evidence(a, front=0.02 * a), evidence(0.3, front=0.05)
+    rival = evidence(b, front=front, free=free)
+    assert margin(best, [first, rival]) <= margin(best, [first])
+
+
+def test_the_pair_of_a_toothed_wheel_is_ambiguous():
+    options = (
+        Alternative(i_from_j=Pose.identity(), evidence=evidence(0.9, front=0.01)),
+        Alternative(i_from_j=turned(1), evidence=evidence(0.4, front=0.005)),
+    )
+    found = classify_pair(0, 1, options, np.eye(6), 0.1, None, PairsConfig())
+    assert found.kind is PairKind.AMBIGUOUS and len(found.alternatives) == 2
