@@ -74,6 +74,7 @@ def estimate_scales(
     sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
     logs = dict.fromkeys(poses, 0.0)
     deviations: dict[int, float] = {}
+    order: list[int] = []
     for _ in range(NUM_ROUNDS):
         grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
         terms = _surface_terms(grown, poses, diameter)
