@@ -16,7 +16,15 @@ from scanweld.multiview.explain import why_open
 from scanweld.multiview.view_graph import ViewGraph
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.register import register_pair
-from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult, near_best, weights_of
+from scanweld.pairs.result import (
+    VIOLATION_WEIGHT,
+    Alternative,
+    Evidence,
+    PairKind,
+    PairResult,
+    near_best,
+    weights_of,
+)
 from scanweld.pairs.slippage import Slide, Slippage
 from scanweld.pairs.symmetry import Likeness, Symmetry, symmetry_of
 from tests.prepared import pair_of_scene
@@ -126,26 +134,35 @@ def test_chance_does_not_hide_an_axis_unless_it_counts_most():
 
 
 def alternative(score: float) -> Alternative:
-    rest = dict.fromkeys(("front", "contradict", "free", "occluded", "unknown"), 0.0)
-    return Alternative(i_from_j=Pose.identity(), evidence=Evidence(agree=score, **rest))
+    """Poses that all overlap as much, and differ by what lies before the surface."""
+    rest = dict.fromkeys(("contradict", "free", "occluded", "unknown"), 0.0)
+    front = (0.9 - score) / VIOLATION_WEIGHT
+    return Alternative(i_from_j=Pose.identity(), evidence=Evidence(agree=0.9, front=front, **rest))
 
 
 def test_weights_fall_with_the_score_and_sum_to_one():
     options = [alternative(score) for score in (0.8, 0.8, 0.7, 0.48, 0.1, -0.4)]
     weights = weights_of(options, 0.4, 0.1)
     assert sum(weights) == pytest.approx(1.0)
-    assert weights[0] == weights[1]
+    assert weights[0] == pytest.approx(weights[1])
     assert list(weights) == sorted(weights, reverse=True)
     # 0.48 is beaten by just the margin of 0.4.
     assert weights[3] / weights[0] == pytest.approx(np.exp(-2.0))
     assert weights[5] < 1e-2
 
 
+def test_a_rival_that_nothing_contradicts_weighs_as_much_where_it_overlaps_less():
+    best, rival = alternative(0.89), alternative(0.89)
+    less = Evidence(agree=0.4, front=0.0, contradict=0.0, free=0.0, occluded=0.6, unknown=0.0)
+    weights = weights_of([best, Alternative(i_from_j=rival.i_from_j, evidence=less)], 0.4, 0.1)
+    assert weights == pytest.approx((0.5, 0.5), abs=0.05)
+
+
 def test_weights_do_not_ask_whether_there_is_a_margin():
     assert weights_of([], 0.4, 0.1) == ()
     assert weights_of([alternative(-0.2)], 0.4, 0.1) == (1.0,)
     bad = weights_of([alternative(-0.1), alternative(-0.1)], 0.4, 0.1)
-    assert bad == (0.5, 0.5)
+    assert bad == pytest.approx((0.5, 0.5))
     assert weights_of([alternative(0.5), alternative(0.4)], 0.0, 0.0) == (1.0, 0.0)
 
 

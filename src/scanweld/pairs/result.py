@@ -87,19 +87,6 @@ def margin_over(score: float, rivals: Sequence[float]) -> float:
     return min(1.0, (score - max(rivals)) / score) if rivals else 1.0
 
 
-def rival_score(rival: Evidence, best: Evidence) -> float:
-    """What a pose scores as a rival of another one of the same two scans.
-
-    A rival that is contradicted no more explains the scans as well, if they overlap less in it:
-    on a symmetric object the next turn does. It counts as if it overlapped as much.
-    """
-    bearable = max(CLEAN_SHARE, AS_CLEAN * best.violation / max(best.agree, MIN_AGREE))
-    is_seen = rival.agree >= max(MIN_AGREE, MIN_RIVAL_SHARE * best.agree)
-    if not is_seen or rival.violation > bearable * rival.agree:
-        return rival.score
-    return rival.score * max(1.0, best.agree / rival.agree)
-
-
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Alternative:
     """A pose of a pair with its evidence. The frames are those of the result it belongs to.
@@ -118,6 +105,20 @@ class Alternative:
     def score(self) -> float:
         """The evidence's score."""
         return self.evidence.score
+
+
+def rival_score(rival: Alternative, best: Alternative) -> float:
+    """What a pose scores as a rival of another one of the same two scans.
+
+    A rival that is contradicted no more explains the scans as well, if they overlap less in it:
+    on a symmetric object the next turn does. It counts as if it overlapped as much.
+    """
+    said, told = rival.evidence, best.evidence
+    bearable = max(CLEAN_SHARE, AS_CLEAN * told.violation / max(told.agree, MIN_AGREE))
+    is_seen = said.agree >= max(MIN_AGREE, MIN_RIVAL_SHARE * told.agree)
+    if not is_seen or said.violation > bearable * said.agree:
+        return rival.score
+    return rival.score * max(1.0, told.agree / said.agree)
 
 
 def near_best(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
@@ -139,17 +140,18 @@ def weights_of(
 ) -> tuple[float, ...]:
     """How much each alternative counts beside the others; sums to 1.
 
-    Weights fall exponentially with the score, by e^2 = 7.4 where the best pose beats a rival by
-    just the margin that makes it sure.
+    Weights fall exponentially with the score (of the others, as rivals of the first), by
+    e^2 = 7.4 where the first pose beats a rival by just the margin that makes it sure.
 
     Args:
-        alternatives: Distinct poses of a pair.
+        alternatives: Distinct poses of a pair, the best first.
         min_margin: Share of the score by which a pose must beat its rivals to be sure.
         min_score: Least score of a pair; of worse ones the margin is not measured.
     """
     if not alternatives:
         return ()
-    scores = np.array([option.score for option in alternatives])
+    first, *others = alternatives
+    scores = np.array([first.score, *(rival_score(option, first) for option in others)])
     step = max(min_margin * max(scores.max(), min_score), np.finfo(float).eps)
     weights = np.exp(MARGIN_WEIGHT * (scores - scores.max()) / step)
     return tuple((weights / weights.sum()).tolist())
@@ -157,8 +159,8 @@ def weights_of(
 
 def margin_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> float:
     """Margin of one of a pair's poses over the others."""
-    others = [option.evidence for option in alternatives if option is not chosen]
-    return margin_over(chosen.score, [rival_score(other, chosen.evidence) for other in others])
+    others = [option for option in alternatives if option is not chosen]
+    return margin_over(chosen.score, [rival_score(other, chosen) for other in others])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
