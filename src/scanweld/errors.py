@@ -21,5 +21,9 @@ class KnowledgeError(ScanweldError):
     """Something given beforehand that cannot be meant: about no scan, or against itself."""
 
 
+class BudgetError(ScanweldError):
+    """A budget of memory that is no size, or too little for the scans."""
+
+
 class InputError(ScanweldError):
     """Too little, or nothing, to work on."""

@@ -17,12 +17,13 @@ import typer
 from scanweld.app.comparison import compare, comparison_table
 from scanweld.app.info import describe_scan
 from scanweld.app.job import run_job
+from scanweld.app.memory import parse_size
 from scanweld.app.named_pairs import named_pairs, with_pairs_joined
 from scanweld.app.progress import reporting
 from scanweld.app.summary import summary
 from scanweld.app.workspace import work_folder
 from scanweld.config import load_config
-from scanweld.errors import KnowledgeError, ScanweldError
+from scanweld.errors import BudgetError, KnowledgeError, ScanweldError
 from scanweld.evaluation.metrics import Standing
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.simulate import TYPICAL_NOISE
@@ -76,6 +77,10 @@ Files = Annotated[
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
+Memory = Annotated[
+    str | None,
+    typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
+]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random.")]
 WithDoubtful = Annotated[
     bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
@@ -116,6 +121,7 @@ def run(
     output: Output,
     config: ConfigFile = None,
     workers: Workers = None,
+    memory: Memory = None,
     seed: Seed = None,
     unit: UnitOption = None,
     method: MethodOption = None,
@@ -157,6 +163,7 @@ def run(
                 settings,
                 knowledge=known,
                 workers=workers,
+                memory=None if memory is None else parse_size(memory),
                 force=force,
                 progress=progress,
             )
@@ -251,4 +258,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
         app(args=with_pairs_joined(given), prog_name="scanweld")
     except ScanweldError as error:
         _print_error(error)
-        sys.exit(USAGE if isinstance(error, KnowledgeError) else ERROR)
+        sys.exit(USAGE if isinstance(error, (KnowledgeError, BudgetError)) else ERROR)

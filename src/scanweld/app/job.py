@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld import pipeline
+from scanweld.app.memory import points_within
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
@@ -11,6 +12,7 @@ from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.knowledge import Knowledge
+from scanweld.prepare.thinning import thinned
 from scanweld.progress import Progress, silent
 from scanweld.reconstruction import Reconstruction
 
@@ -22,6 +24,7 @@ def run_job(
     *,
     knowledge: Knowledge | None = None,
     workers: int | None = None,
+    memory: int | None = None,
     force: bool = False,
     progress: Progress = silent,
 ) -> Reconstruction:
@@ -33,6 +36,7 @@ def run_job(
         config: Settings; the defaults if not given.
         knowledge: What is known of the scans beforehand.
         workers: Threads; as many as there are cores if not given.
+        memory: Bytes that the run may take, about: large scans are thinned for it. Any if None.
         force: Whether an output that is there already is replaced.
         progress: Called with (stage, done, total).
 
@@ -43,7 +47,8 @@ def run_job(
     files = collect(inputs)
     paths = [file.path for file in files]
     with Workspace(Path(output), inputs=paths, force=force) as workspace:
-        scans, unreadable = read_all(files, progress)
+        max_points = None if memory is None else points_within(memory, paths)
+        scans, unreadable = read_all(files, progress, max_points)
         result = pipeline.run(
             scans,
             config or Config(),
@@ -59,15 +64,16 @@ def run_job(
 
 
 def read_all(
-    files: Sequence[ScanFile], progress: Progress = silent
+    files: Sequence[ScanFile], progress: Progress = silent, max_points: int | None = None
 ) -> tuple[list[RangeScan], dict[str, str]]:
-    """Scans of all files that can be read, and for the others name -> reason."""
+    """Scans of all files that can be read, thinned if need be; of the others, name -> reason."""
     scans: list[RangeScan] = []
     unreadable: dict[str, str] = {}
     for done, file in enumerate(files):
         progress("read", done, len(files))
         try:
-            scans.append(read_scan(file.path, file.name))
+            scan = read_scan(file.path, file.name)
+            scans.append(scan if max_points is None else thinned(scan, max_points))
         except ReadError as error:
             unreadable[file.name] = printable(str(error))
     progress("read", len(files), len(files))

@@ -1,0 +1,103 @@
+"""Scans with more points than memory has room for, thinned evenly and always in the same way."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.camera import Camera
+from scanweld.geometry.scan import RangeScan
+
+CELLS_PER_POINT = 4
+"""Cells of a range grid for each of its points, at most: empty ones take room as well."""
+SLACK = 1.02
+"""Cells of space grow at least by this until few enough are left."""
+
+
+def thinned(scan: RangeScan, max_points: int) -> RangeScan:
+    """The scan with so many points at most, and a note that says so; itself if it is small.
+
+    Of a range grid every k-th row and column stays, with the camera that sees these. Other points
+    are sorted into cubes, of which the point nearest to the middle stays; a mesh's faces go to the
+    points that stay for their corners. The cubes follow the principal axes, so that moving a scan
+    changes nothing.
+    """
+    cells = 0 if scan.grid is None else scan.grid.size
+    if len(scan.points) <= max_points and cells <= CELLS_PER_POINT * max_points:
+        return scan
+    grid = None if scan.grid is None or not (scan.grid >= 0).any() else scan.grid
+    smaller, how = _in_cubes(scan, max_points) if grid is None else _strided(scan, grid, max_points)
+    told = f"thinned from {len(scan.points)} to {len(smaller.points)} points to save memory, {how}"
+    return replace(smaller, notes=(*scan.notes, told))
+
+
+def _strided(scan: RangeScan, grid: IntArray, max_points: int) -> tuple[RangeScan, str]:
+    """Every k-th row and column of the grid, k as small as it can be."""
+    most = max(np.sqrt((grid >= 0).sum() / max_points), np.sqrt(grid.size / max_points) / 2)
+    step = max(2, int(np.ceil(most)))
+    while (count := int((grid[::step, ::step] >= 0).sum())) > max_points:
+        step += 1
+    if count == 0:
+        return _in_cubes(replace(scan, grid=None, camera=None), max_points)
+    coarse = np.ascontiguousarray(grid[::step, ::step])
+    kept = np.zeros(len(scan.points), dtype=bool)
+    kept[coarse[coarse >= 0]] = True
+    smaller = replace(scan, grid=coarse, faces=None, camera=_strided_camera(scan.camera, step))
+    return smaller.only(kept), f"one row and column in {step}"
+
+
+def _strided_camera(camera: Camera | None, step: int) -> Camera | None:
+    """The camera whose pixels are every step-th of another's."""
+    if camera is None:
+        return None
+    return replace(
+        camera,
+        width=-(-camera.width // step),
+        height=-(-camera.height // step),
+        fx=camera.fx / step,
+        fy=camera.fy / step,
+        cx=camera.cx / step,
+        cy=camera.cy / step,
+    )
+
+
+def _in_cubes(scan: RangeScan, max_points: int) -> tuple[RangeScan, str]:
+    """One point of each cube of space, with cubes just large enough."""
+    centred = scan.points - scan.points.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    along = centred @ axes
+    edge = float(np.ptp(along, axis=0).max()) / np.sqrt(max_points)
+    while True:
+        cube_of = _cubes(along, edge)
+        count = int(cube_of.max()) + 1
+        if count <= max_points:
+            break
+        edge *= max(SLACK, np.sqrt(count / max_points))
+    chosen = _central(along, edge, cube_of)
+    kept = np.zeros(len(along), dtype=bool)
+    kept[chosen] = True
+    smaller = replace(scan, faces=None, grid=None).only(kept)
+    if scan.faces is not None:
+        number = np.cumsum(kept) - 1
+        faces = number[chosen[cube_of]][scan.faces]
+        a, b, c = faces.T
+        smaller = replace(smaller, faces=faces[(a != b) & (b != c) & (c != a)])
+    return smaller, "one in each cube of space"
+
+
+def _cubes(along: FloatArray, edge: float) -> IntArray:
+    """Number (N,) of the cube that each point lies in; cubes are numbered from 0 without gaps."""
+    cell = np.rint(along / edge).astype(np.int64)
+    cell -= cell.min(axis=0)
+    shape = cell.max(axis=0) + 1
+    flat = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
+    return np.unique(flat, return_inverse=True)[1].astype(np.int64)
+
+
+def _central(along: FloatArray, edge: float, cube_of: IntArray) -> IntArray:
+    """Index (C,) of the point of each cube that is nearest to its middle."""
+    off = along / edge
+    off -= np.rint(off)
+    order = np.lexsort(((off**2).sum(axis=1), cube_of))
+    _, first = np.unique(cube_of[order], return_index=True)
+    return order[first]
