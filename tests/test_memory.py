@@ -1,5 +1,6 @@
 """A budget of memory: how many points it leaves room for, and how scans are thinned to them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from scanweld.app.memory import MEGABYTE, MIN_POINTS, parse_size, points_within
 from scanweld.config import PrepareConfig
 from scanweld.errors import BudgetError
+from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.prepare import prepare
@@ -72,7 +74,7 @@ def test_too_little_memory_is_refused_with_what_is_needed(tmp_path: Path):
 
 
 @pytest.mark.parametrize("make", [a_scan, lambda: bare(a_scan())], ids=["grid", "points"])
-def test_a_thinned_scan_has_no_more_points_and_says_so(make):
+def test_a_thinned_scan_has_no_more_points_and_says_so(make: Callable[[], RangeScan]):
     scan = make()
     most = len(scan.points) // 5
     smaller = thinned(scan, most)
@@ -106,9 +108,9 @@ def test_a_thinned_mesh_keeps_its_surface():
     smaller = thinned(scan, len(scan.points) // 3)
     assert smaller.faces is not None and len(smaller.faces) > 0.15 * len(mesh.faces)
 
-    def area(points, faces):
+    def area(points: FloatArray, faces: IntArray) -> float:
         a, b, c = points[faces].swapaxes(0, 1)
-        return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+        return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
 
     assert area(smaller.points, smaller.faces) == pytest.approx(
         area(mesh.vertices, mesh.faces), rel=0.15
