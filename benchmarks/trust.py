@@ -51,7 +51,10 @@ def main() -> int:
         command=shlex.join(["python", "-m", "benchmarks.trust", *sys.argv[1:]]),
         code=TRUST_CODE,
     )
-    if not options.pages:
+    if options.so_far:
+        runs = Runs(scenarios=tuple(options.only), seeds=options.seeds)
+        study.write(runs, study.finished(runs))
+    elif not options.pages:
         _measure(Runs(scenarios=tuple(options.only), seeds=options.seeds), study)
         if options.compare:
             _measure(Rivals(), replace(study, code=RIVALS_CODE))
@@ -92,6 +95,9 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="a handful of runs")
     parser.add_argument(
         "--compare", action="store_true", help="other tools on some pairs too (extra: bench)"
+    )
+    parser.add_argument(
+        "--so-far", action="store_true", help="no more runs: the page from those that are finished"
     )
     parser.add_argument("--pages", action="store_true", help="only write the page anew")
     parser.add_argument("--jobs", type=int, help="processes (default: one a core)")

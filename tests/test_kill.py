@@ -15,6 +15,8 @@ from scanweld.io import write_scan_ply
 from tests.scenes import creature_scene
 
 NUM_KILLS = 5
+MOST_KEPT = 14
+"""Of five scans: their keypoints and all pairs but one are kept."""
 
 
 def command(scans: Path, output: Path, *more: str) -> list[str]:
@@ -35,38 +37,38 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def finished(output: Path) -> set[str]:
+    """Names of the cached work of a run that makes an output."""
+    return {p.name for p in work_folder(output).glob("cache/**/*") if p.is_file()}
+
+
 @pytest.fixture(scope="module")
-def undisturbed(scans: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
-    """The output of a run that nobody disturbs, and how many seconds it takes."""
+def undisturbed(scans: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output of a run that nobody disturbs."""
     output = tmp_path_factory.mktemp("whole") / "model"
     subprocess.run(command(scans, output), check=False)
-    start = time.perf_counter()
-    subprocess.run(command(scans, output, "--force"), check=False)
-    return output, time.perf_counter() - start
+    return output
 
 
 def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same(
-    scans: Path, undisturbed: tuple[Path, float], tmp_path: Path
+    scans: Path, undisturbed: Path, tmp_path: Path
 ):
     """Each run goes on from what the one before it left, and none begins again."""
-    whole, seconds = undisturbed
     output = tmp_path / "model"
     output.mkdir()
     (output / "old.txt").write_text("kept")
     kept: set[str] = set()
-    for moment in np.sort(np.random.default_rng(4).uniform(0.1, 0.9, NUM_KILLS)):
+    for num_finished in np.sort(np.random.default_rng(4).permutation(MOST_KEPT)[:NUM_KILLS]) + 1:
         run = subprocess.Popen(command(scans, output, "--force"))
-        time.sleep(moment * seconds)
-        if run.poll() is not None:
-            break
+        while len(finished(output)) < num_finished:
+            assert run.poll() is None, "the run ended before it could be killed"
+            time.sleep(0.002)
         os.kill(run.pid, signal.SIGKILL)
         assert run.wait() == -signal.SIGKILL
         assert [p.name for p in output.iterdir()] == ["old.txt"]
         assert (output / "old.txt").read_text() == "kept"
-        cached = {p.name for p in work_folder(output).glob("cache/**/*") if p.is_file()}
-        assert kept <= cached, "work that was finished is gone"
-        kept = cached
-    assert kept, "no run was killed after it had finished something"
+        assert kept <= finished(output), "work that was finished is gone"
+        kept = finished(output)
     stamps = {p: p.stat().st_mtime_ns for p in work_folder(output).glob("cache/**/*")}
     run = subprocess.Popen(command(scans, output, "--force"))
     redone = set()
@@ -79,7 +81,7 @@ def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same
                 continue
         time.sleep(0.01)
     assert not redone, "finished work was done again"
-    assert contents(output) == contents(whole)
+    assert contents(output) == contents(undisturbed)
     assert not work_folder(output).exists()
 
 

@@ -107,6 +107,13 @@ class Study:
             Record(unit=unit, result=results[key]) for key, unit in zip(keys, units, strict=True)
         ]
 
+    def finished(self, table: Table) -> list[Record]:
+        """The records that an interrupted study has kept, in the table's order."""
+        code = self._code_digest(table)
+        results = _stored(self.work / f"{table.NAME}.jsonl")
+        found = [(unit, results.get(_key(code, table, unit))) for unit in table.units(self.quick)]
+        return [Record(unit=unit, result=result) for unit, result in found if result is not None]
+
     def write(self, table: Table, records: Sequence[Record]) -> None:
         """Write the records of a table as JSON."""
         document = {
