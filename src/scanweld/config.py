@@ -195,8 +195,8 @@ class ConfidenceConfig(Section):
     """Evidence -> probability that a pose is right."""
 
     min_good: float = Field(default=0.9, ge=0, le=1)
-    """Confidence below which a placed scan is doubtful. None of the wrong scans of the calibration
-    had more, held out."""
+    """Confidence below which a placed scan is doubtful. Of 44 wrong scans of the calibration 4 had
+    more, held out."""
 
 
 class FusionConfig(Section):
