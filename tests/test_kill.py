@@ -1,6 +1,6 @@
 """A run that is killed at any moment leaves what was there, and the next one goes on from it."""
 
-import os
+import json
 import signal
 import subprocess
 import sys
@@ -15,87 +15,110 @@ from scanweld.io import write_scan_ply
 from tests.scenes import creature_scene
 
 NUM_KILLS = 5
-MOST_KEPT = 14
-"""Of five scans: their keypoints and all pairs but one are kept."""
+PROGRAM = """
+import os, signal, sys, threading, time
+from scanweld.app.cache import FileCache
+from scanweld.app.job import run_job
+
+scans, output, journal, moment, delay = sys.argv[1:]
+put, calls = FileCache.put, 0
 
 
-def command(scans: Path, output: Path, *more: str) -> list[str]:
-    start = "from scanweld.app.cli import main; main()"
-    return [sys.executable, "-c", start, "run", str(scans), "-o", str(output), "-q", *more]
+def put_and_tell(self, key, value):
+    put(self, key, value)
+    with open(journal, "a") as file:
+        file.write(key + "\\n")
+
+
+def die():
+    time.sleep(float(delay))
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def progress(stage, done, total):
+    global calls
+    calls += 1
+    if calls == int(moment):
+        threading.Thread(target=die).start()
+
+
+FileCache.put = put_and_tell
+run_job([scans], output, workers=1, force=True, progress=progress)
+print(calls)
+"""
+"""A run that tells what it finishes, and dies a while after so many steps (never, if it is 0)."""
+
+
+def run(
+    scans: Path, output: Path, journal: Path, moment: int = 0, delay: float = 0.0
+) -> subprocess.CompletedProcess[str]:
+    arguments = [str(x) for x in (scans, output, journal, moment, delay)]
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False
+    )
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Files of an output but for the report, which tells of times."""
-    return {p.name: p.read_bytes() for p in folder.iterdir() if p.name != "report.json"}
+    """All files of an output, the report without the stages, which tell of times."""
+    files = {path.name: path.read_bytes() for path in folder.iterdir()}
+    report = json.loads(files.pop("report.json"))
+    del report["stages"]
+    return {**files, "report": json.dumps(report).encode()}
 
 
 @pytest.fixture(scope="module")
 def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("scans")
-    for scan in creature_scene(5, pixels=100.0).scans:
+    for scan in creature_scene(4, pixels=70.0).scans:
         write_scan_ply(folder / f"{scan.name}.ply", scan)
     return folder
 
 
-def finished(output: Path) -> set[str]:
-    """Names of the cached work of a run that makes an output."""
-    return {p.name for p in work_folder(output).glob("cache/**/*") if p.is_file()}
-
-
-@pytest.fixture(scope="module")
-def undisturbed(scans: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The output of a run that nobody disturbs."""
-    output = tmp_path_factory.mktemp("whole") / "model"
-    subprocess.run(command(scans, output), check=False)
-    return output
-
-
 def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same(
-    scans: Path, undisturbed: Path, tmp_path: Path
+    scans: Path, tmp_path: Path
 ):
-    """Each run goes on from what the one before it left, and none begins again."""
+    """Moments are spread over all of a run; each goes on from what the one before it left."""
+    undisturbed, journal = tmp_path / "undisturbed", tmp_path / "journal"
+    whole = run(scans, undisturbed, journal)
+    assert whole.returncode == 0, whole.stderr
+    num_steps, finished = int(whole.stdout), journal.read_text().split()
+    journal.unlink()
+
     output = tmp_path / "model"
     output.mkdir()
-    (output / "old.txt").write_text("kept")
-    kept: set[str] = set()
-    for num_finished in np.sort(np.random.default_rng(4).permutation(MOST_KEPT)[:NUM_KILLS]) + 1:
-        run = subprocess.Popen(command(scans, output, "--force"))
-        while len(finished(output)) < num_finished:
-            assert run.poll() is None, "the run ended before it could be killed"
-            time.sleep(0.002)
-        os.kill(run.pid, signal.SIGKILL)
-        assert run.wait() == -signal.SIGKILL
-        assert [p.name for p in output.iterdir()] == ["old.txt"]
-        assert (output / "old.txt").read_text() == "kept"
-        assert kept <= finished(output), "work that was finished is gone"
-        kept = finished(output)
-    stamps = {p: p.stat().st_mtime_ns for p in work_folder(output).glob("cache/**/*")}
-    run = subprocess.Popen(command(scans, output, "--force"))
-    redone = set()
-    while run.poll() is None:
-        for path, stamp in stamps.items():
-            try:
-                if path.is_file() and path.stat().st_mtime_ns != stamp:
-                    redone.add(path.name)
-            except FileNotFoundError:
-                continue
-        time.sleep(0.01)
-    assert not redone, "finished work was done again"
+    old = {"mine.txt": b"old", "poses.json": b"{}"}
+    for name, content in old.items():
+        (output / name).write_bytes(content)
+    rng = np.random.default_rng(7)
+    moments = (np.arange(NUM_KILLS) + rng.random(NUM_KILLS)) / NUM_KILLS * num_steps
+    for moment in moments:
+        killed = run(scans, output, journal, 1 + int(moment), rng.uniform(0, 0.05))
+        assert killed.returncode == -signal.SIGKILL, killed.stderr
+        assert {path.name: path.read_bytes() for path in output.iterdir()} == old
+
+    last = run(scans, output, journal)
+    assert last.returncode == 0, last.stderr
     assert contents(output) == contents(undisturbed)
+    # No piece of work was finished twice; a run may have died just before it told of one.
+    told = journal.read_text().split()
+    assert len(set(told)) == len(told) >= len(finished) - NUM_KILLS >= 5
+    assert set(told) <= set(finished)
     assert not work_folder(output).exists()
 
 
 def test_a_second_run_on_the_same_output_is_refused(scans: Path, tmp_path: Path):
-    output = tmp_path / "model"
-    first = subprocess.Popen(command(scans, output))
+    output, start = tmp_path / "model", "from scanweld.app.cli import main; main()"
+    command = [sys.executable, "-c", start, "run", str(scans), "-o", str(output), "-q"]
+    lock = work_folder(output) / "lock"
+    first = subprocess.Popen(command)
     try:
-        while not (work_folder(output) / "lock").exists():
+        while not (lock.exists() and lock.read_text()):
             assert first.poll() is None, "the first run ended before the second could start"
             time.sleep(0.02)
-        second = subprocess.run(command(scans, output), capture_output=True, text=True, check=False)
+        second = subprocess.run(command, capture_output=True, text=True, check=False)
         assert second.returncode == 1
         assert len(second.stderr.strip().splitlines()) == 1
-        assert "another run" in second.stderr
+        assert "another run" in second.stderr and f"process {first.pid}" in second.stderr
     finally:
         first.wait()
     assert (output / "poses.json").is_file()

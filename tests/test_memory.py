@@ -1,18 +1,30 @@
 """A budget of memory: how many points it leaves room for, and how scans are thinned to them."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
-from scanweld.app.memory import MEGABYTE, MIN_POINTS, parse_size, points_within
+from scanweld.app import job
+from scanweld.app.job import run_job
+from scanweld.app.memory import (
+    MEGABYTE,
+    MIN_POINTS,
+    parse_size,
+    points_within,
+    workers_within,
+)
 from scanweld.config import PrepareConfig
 from scanweld.errors import BudgetError
+from scanweld.evaluation.primitives import sphere
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io import write_scan_ply
 from scanweld.prepare import prepare
 from scanweld.prepare.thinning import thinned
 from tests.prepared import moved
@@ -123,3 +135,88 @@ def test_moving_a_scan_does_not_change_what_stays():
     here, there = thinned(scan, 1000), thinned(moved(scan, motion), 1000)
     assert len(here.points) == len(there.points)
     np.testing.assert_allclose(motion.apply(here.points), there.points, atol=1e-6)
+
+
+def test_few_large_scans_leave_room_to_prepare_them(tmp_path: Path):
+    """A million points take little while they are kept, and much while they are worked on."""
+    budget = 1024 * MEGABYTE
+    points = points_within(budget, files(tmp_path, 2))
+    assert points < 600_000
+    assert workers_within(budget, [points, points], 64) >= 2
+
+
+def test_what_is_thinned_takes_fewer_workers_the_larger_it_is():
+    budget = 1024 * MEGABYTE
+    counts = [workers_within(budget, [points] * 10, 8) for points in (1000, 10**5, 10**6)]
+    assert counts[0] == 8 and counts == sorted(counts, reverse=True) and counts[-1] == 1
+    assert workers_within(budget, [1000], 1) == workers_within(budget, [], 1) == 1
+
+
+def test_formats_that_take_more_to_read_leave_less(tmp_path: Path):
+    left = []
+    for suffix in (".ply", ".off"):
+        path = (tmp_path / "a").with_suffix(suffix)
+        with path.open("wb") as file:
+            file.truncate(30 * MEGABYTE)
+        left.append(points_within(1000 * MEGABYTE, [path] * 10))
+    assert left[0] > left[1] >= MIN_POINTS
+
+
+def test_a_grid_with_an_empty_margin_is_not_thinned_for_it():
+    scan = a_scan()
+    assert scan.grid is not None and scan.grid.size > 4 * len(scan.points)
+    assert thinned(scan, len(scan.points)) is scan
+
+
+def test_a_grid_of_empty_cells_is_thinned():
+    scan = a_scan()
+    assert scan.grid is not None
+    wide = np.full((12 * len(scan.grid), scan.grid.shape[1]), -1)
+    wide[::12] = scan.grid
+    smaller = thinned(replace(scan, grid=wide, camera=None), len(scan.points))
+    assert smaller.grid is not None
+    assert smaller.grid.size <= 8 * len(scan.points) and len(smaller.points) > 100
+
+
+def test_points_are_thinned_evenly_to_about_what_there_is_room_for():
+    ball = sphere().vertices
+    for most in (2000, 500, 60):
+        smaller = thinned(RangeScan(name="ball", points=ball), most)
+        assert 0.7 * most < len(smaller.points) <= most
+        reach, _ = KDTree(smaller.points).query(ball)
+        assert reach.max() < 3.0 * np.sqrt(4 * np.pi * 50.0**2 / len(smaller.points))
+
+
+def test_stray_points_do_not_make_the_cubes_large():
+    points = np.random.default_rng(0).normal(size=(3000, 3)) * [30.0, 20.0, 4.0]
+    points[-1] = [1e9, 0.0, 0.0]
+    assert len(thinned(RangeScan(name="a", points=points), 500).points) > 250
+
+
+@pytest.mark.parametrize("place", [0.0, 1.0, 0.1])
+def test_points_in_one_place_become_one(place: float):
+    scan = RangeScan(name="a", points=np.full((100, 3), place))
+    assert len(thinned(scan, 10).points) == 1
+
+
+def test_what_belongs_to_a_point_stays_with_it():
+    scan = replace(bare(a_scan()), confidence=np.arange(float(len(a_scan().points))))
+    smaller = thinned(scan, 700)
+    assert smaller.confidence is not None
+    np.testing.assert_array_equal(scan.points[smaller.confidence.astype(int)], smaller.points)
+
+
+def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    for scan in creature_scene(2, pixels=60.0).scans:
+        write_scan_ply(folder / f"{scan.name}.ply", scan)
+    write_scan_ply(folder / "large.ply", replace(a_scan(), name="large"))
+    monkeypatch.setattr(job, "points_within", lambda budget, paths: 1200)
+    run_job([folder], tmp_path / "model", memory=10_000 * MEGABYTE, workers=1)
+    told = json.loads((tmp_path / "model" / "report.json").read_text())["scans"]
+    assert told["large"]["num_points"] <= 1200
+    assert any("thinned from" in note for note in told["large"]["notes"])
+    assert not any("thinned" in note for note in told["scan_01"]["notes"])

@@ -1,10 +1,11 @@
 """The main job: files to an output folder."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld import pipeline
-from scanweld.app.memory import points_within
+from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
@@ -12,9 +13,13 @@ from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.knowledge import Knowledge
+from scanweld.parallel import num_workers
 from scanweld.prepare.thinning import thinned
 from scanweld.progress import Progress, silent
 from scanweld.reconstruction import Reconstruction
+from scanweld.stages import peak_memory_mb
+
+logger = logging.getLogger(__name__)
 
 
 def run_job(
@@ -36,7 +41,8 @@ def run_job(
         config: Settings; the defaults if not given.
         knowledge: What is known of the scans beforehand.
         workers: Threads; as many as there are cores if not given.
-        memory: Bytes that the run may take, about: large scans are thinned for it. Any if None.
+        memory: Bytes that the run may take: large scans are thinned for it, and fewer are prepared
+            at a time if need be. Any if None.
         force: Whether an output that is there already is replaced.
         progress: Called with (stage, done, total).
 
@@ -49,6 +55,9 @@ def run_job(
     with Workspace(Path(output), inputs=paths, force=force) as workspace:
         max_points = None if memory is None else points_within(memory, paths)
         scans, unreadable = read_all(files, progress, max_points)
+        if memory is not None:
+            num_points = [len(scan.points) for scan in scans]
+            workers = workers_within(memory, num_points, num_workers(workers))
         result = pipeline.run(
             scans,
             config or Config(),
@@ -60,6 +69,8 @@ def run_job(
         )
         write_outputs(result, workspace.staging)
         workspace.publish()
+    if memory is not None and peak_memory_mb() > memory / MEGABYTE:
+        logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
     return result
 
 

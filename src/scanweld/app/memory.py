@@ -1,4 +1,4 @@
-"""How many points of a scan there is room for under a budget of memory."""
+"""How many points of a scan, and how many workers, there is room for under a budget of memory."""
 
 import re
 from collections.abc import Sequence
@@ -10,16 +10,25 @@ MEGABYTE = 2**20
 _UNITS = {"": MEGABYTE, "m": MEGABYTE, "mb": MEGABYTE, "g": 2**30, "gb": 2**30}
 _SIZE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([a-z]*)\s*", re.IGNORECASE)
 
-# Measured on runs of 6 and 20 scans of 45 thousand to a million points.
-BASE = 480 * MEGABYTE
-"""What a run takes besides its scans: libraries, compiled kernels, the fusion of the model,"""
-READING = 260 * MEGABYTE
-"""and what has been taken of it when files are read."""
+# Measured on runs of 2 to 20 scans of 45 thousand to a million points, and rounded up. The same on
+# all machines and for any number of workers, so that what becomes of a scan is the same, too.
+BASE = 220 * MEGABYTE
+"""What a run takes besides its scans: the interpreter, libraries, compiled kernels,"""
+FUSION = 260 * MEGABYTE
+"""and, in the end, the fusion of the model."""
 PER_SCAN = 8 * MEGABYTE
 """A scan's range image and samples, whatever its points."""
 PER_POINT = 110
-PER_FILE_BYTE = 11
-"""A file while it is read, beside its size."""
+"""A point that is kept: place, normal, colour, cell of the grid, faces."""
+PER_WORKED_POINT = 700
+"""A point of a scan that is being prepared, besides, in each worker."""
+NUM_PLANNED = 2
+"""Workers that there is room for in any case."""
+READING = 30 * MEGABYTE
+"""What reading a file takes, whatever its size,"""
+PER_FILE_BYTE = {".ply": 6, ".stl": 8, ".obj": 9, ".off": 21}
+PER_TEXT_BYTE = 7
+"""and for each of its bytes."""
 MIN_POINTS = 20_000
 """Scans are thinned to no fewer points: a working range image has about as many."""
 
@@ -42,13 +51,35 @@ def points_within(budget: int, files: Sequence[Path]) -> int:
     Raises:
         BudgetError: If that is too little to work with.
     """
-    largest = max((path.stat().st_size for path in files if path.is_file()), default=0)
-    fixed = max(BASE + PER_SCAN * len(files), READING + PER_FILE_BYTE * largest)
-    least = fixed + MIN_POINTS * PER_POINT * len(files)
+    n = max(len(files), 1)
+    kept = BASE + PER_SCAN * n
+    phases = (
+        (BASE + max(map(_reading, files), default=0), 0),
+        (kept, NUM_PLANNED * PER_WORKED_POINT),
+        (kept + FUSION, 0),
+    )
+    least = max(fixed + MIN_POINTS * (PER_POINT * n + each) for fixed, each in phases)
     if budget < least:
+        largest = max(map(_size, files), default=0)
         scans = f"{len(files)} scans with files of up to {largest / MEGABYTE:.0f} MB"
         raise BudgetError(
             f"--memory {budget // MEGABYTE}M: is too little for {scans}; "
             f"give at least {-(-least // MEGABYTE)}M, or fewer scans"
         )
-    return (budget - fixed) // (PER_POINT * max(len(files), 1))
+    return min((budget - fixed) // (PER_POINT * n + each) for fixed, each in phases)
+
+
+def workers_within(budget: int, num_points: Sequence[int], asked: int) -> int:
+    """How many scans may be prepared at a time, of so many points each: as asked, or fewer."""
+    kept = BASE + PER_SCAN * len(num_points) + PER_POINT * sum(num_points)
+    each = PER_WORKED_POINT * max(num_points, default=1)
+    return max(1, min(asked, (budget - kept) // each))
+
+
+def _reading(path: Path) -> int:
+    """What reading a file takes for a while."""
+    return READING + _size(path) * PER_FILE_BYTE.get(path.suffix.lower(), PER_TEXT_BYTE)
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.is_file() else 0

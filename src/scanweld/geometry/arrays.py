@@ -1,5 +1,7 @@
 """Array types of the records, and the one way to freeze an array into a record."""
 
+from typing import TypeGuard
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,10 +14,12 @@ ByteArray = NDArray[np.uint8]
 def frozen(values: ArrayLike, dtype: type[np.generic], shape: tuple[int | None, ...]) -> NDArray:
     """A read-only, C-ordered array of the given type; ``None`` in the shape stands for any length.
 
+    A copy, unless the array is frozen already: records share what they hand on.
+
     Raises:
         ValueError: If the shape does not fit.
     """
-    array = np.array(values, dtype=dtype, order="C", copy=True)
+    array = values if _is_frozen(values, dtype) else np.array(values, dtype=dtype, order="C")
     fits = array.ndim == len(shape) and all(
         want is None or want == have for want, have in zip(shape, array.shape, strict=True)
     )
@@ -23,3 +27,10 @@ def frozen(values: ArrayLike, dtype: type[np.generic], shape: tuple[int | None, 
         raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
     array.flags.writeable = False
     return array
+
+
+def _is_frozen(values: ArrayLike, dtype: type[np.generic]) -> TypeGuard[NDArray]:
+    """Whether nobody can write to an array: a read-only view may be of one that is written to."""
+    if type(values) is not np.ndarray or values.dtype != dtype:
+        return False
+    return values.flags.owndata and values.flags.c_contiguous and not values.flags.writeable

@@ -1,9 +1,11 @@
 """PLY files as range scans and meshes: what their elements and properties mean."""
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
@@ -75,24 +77,39 @@ def read_ply(path: Path, data: bytes) -> RawScan:
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
     """Scalar columns side by side (N, k), or None if one is missing."""
+    found = _scalars(columns, names)
+    return None if found is None else _doubles(found)
+
+
+def _scalars(columns: Columns, names: tuple[str, ...]) -> list[NDArray] | None:
+    """Scalar columns by their names, or None if one is missing."""
     found = [columns.get(name) for name in names]
-    if any(column is None or isinstance(column, Ragged) for column in found):
-        return None
-    return np.stack([np.asarray(column, dtype=np.float64) for column in found], axis=1)
+    scalars = [column for column in found if isinstance(column, np.ndarray)]
+    return scalars if len(scalars) == len(names) else None
+
+
+def _doubles(columns: Sequence[NDArray]) -> FloatArray:
+    """Columns side by side (N, k)."""
+    values = np.empty((len(columns[0]), len(columns)))
+    for k, column in enumerate(columns):
+        values[:, k] = column
+    return values
 
 
 def _bytes(
     path: Path, element: PlyElement, columns: Columns, names: tuple[str, ...]
 ) -> ByteArray | None:
     """Columns as bytes (N, k), by the types that the header declares; None if missing."""
-    values = _stack(columns, names)
-    if values is None:
-        return None
     types = {prop.name: prop.type for prop in element.properties}
-    found = to_bytes(values, types[names[0]])
+    found = _scalars(columns, names)
     if found is None:
+        return None
+    if all(types[name] == "u1" for name in names):
+        return np.stack(found, axis=1)
+    scaled = to_bytes(_doubles(found), types[names[0]])
+    if scaled is None:
         logger.warning("%s: %s are on no known scale, so they are left out", path, ", ".join(names))
-    return found
+    return scaled
 
 
 def _colors(path: Path, element: PlyElement, columns: Columns) -> ByteArray | None:
@@ -104,7 +121,7 @@ def _colors(path: Path, element: PlyElement, columns: Columns) -> ByteArray | No
     return None
 
 
-def _index_list(path: Path, columns: Columns) -> tuple[IntArray, IntArray] | None:
+def _index_list(path: Path, columns: Columns) -> tuple[IntArray | ByteArray, IntArray] | None:
     """Lengths and values of the element's list of vertex indices."""
     column = next((columns[name] for name in _INDEX_LISTS if name in columns), None)
     if not isinstance(column, Ragged):
@@ -138,14 +155,14 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
         raise ReadError(
             f"{header.path}: a cell of its range_grid holds several points; export it anew"
         )
-    grid = np.full(element.count, -1, dtype=np.int64)
-    grid[counts == 1] = values
-    return grid.reshape(rows, columns), ()
+    grid = np.full((rows, columns), -1, dtype=np.int64)
+    grid.reshape(-1)[counts == 1] = values
+    return grid, ()
 
 
 def _faces(header: PlyHeader, tables: dict[str, Columns]) -> IntArray | None:
     polygons = _index_list(header.path, tables.get("face", {}))
-    return None if polygons is None else fan_triangles(*polygons)
+    return None if polygons is None else fan_triangles(polygons[0].astype(np.int64), polygons[1])
 
 
 def _camera(header: PlyHeader) -> Camera | None:

@@ -1,13 +1,16 @@
 """The body of a PLY file, decoded in bulk: ASCII and both binary orders by the same code."""
 
 import struct
+import sys
+from array import array
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import IntArray
+from scanweld.geometry.arrays import ByteArray, IntArray
 from scanweld.io.ply_header import PlyElement, PlyHeader, PlyProperty
 from scanweld.io.text import parse_numbers
 
@@ -16,7 +19,7 @@ from scanweld.io.text import parse_numbers
 class Ragged:
     """A list property: lengths (N,) of the rows' lists and all values (sum of lengths,)."""
 
-    counts: IntArray
+    counts: IntArray | ByteArray
     values: NDArray
 
 
@@ -31,12 +34,13 @@ def decode_body(header: PlyHeader, data: bytes) -> dict[str, Columns]:
     Raises:
         ReadError: If the body is shorter or longer than the header says, or not made of numbers.
     """
-    body = data[header.body_start :]
+    body = memoryview(data)[header.body_start :]
     elements = header.elements
     order = ">" if header.format == "binary_big_endian" else "<"
     if header.format == "ascii":
         first_line = 1 + data.count(b"\n", 0, header.body_start)
-        body = parse_numbers(header.path, body, first_line).astype("<f8").tobytes()
+        body = parse_numbers(header.path, bytes(body), first_line).data.cast("B")
+        order = "<" if sys.byteorder == "little" else ">"
         elements = tuple(_as_doubles(element) for element in elements)
     tables: dict[str, Columns] = {}
     offset = 0
@@ -48,7 +52,7 @@ def decode_body(header: PlyHeader, data: bytes) -> dict[str, Columns]:
                 f"{header.path}: {error}, in element '{element.name}' of {element.count} rows; "
                 "copy the file again or export it anew"
             ) from error
-    if body[offset:].strip(b"\r\n\t \0"):
+    if bytes(body[offset:]).strip(b"\r\n\t \0"):
         raise ReadError(
             f"{header.path}: the body holds more than its header says, so the counts are wrong; "
             "export the file anew"
@@ -74,7 +78,7 @@ def _as_doubles(element: PlyElement) -> PlyElement:
 
 
 def _decode_element(
-    element: PlyElement, order: str, body: bytes, start: int
+    element: PlyElement, order: str, body: memoryview, start: int
 ) -> tuple[Columns, int]:
     """The element's columns and where the next element starts."""
     if element.count == 0 or not element.properties:
@@ -89,6 +93,8 @@ def _decode_element(
             return _uniform_columns(element, rows), end
     if not has_lists:
         raise _BodyError(_TRUNCATED)
+    if [prop.count_type for prop in element.properties] == ["u1"]:
+        return _short_columns(element, order, body, start)
     return _ragged_columns(element, order, body, start)
 
 
@@ -97,7 +103,7 @@ def _empty(prop: PlyProperty) -> NDArray | Ragged:
     return Ragged(np.zeros(0, dtype=np.int64), values) if prop.is_list else values
 
 
-def _first_lengths(element: PlyElement, order: str, body: bytes, start: int) -> list[int]:
+def _first_lengths(element: PlyElement, order: str, body: memoryview, start: int) -> list[int]:
     """Lengths of the first row's lists: most files have the same in every row."""
     _, lengths, _ = _walk(replace(element, count=1), order, body, start)
     return [n for n, p in zip(lengths[0].tolist(), element.properties, strict=True) if p.is_list]
@@ -134,7 +140,7 @@ def _uniform_columns(element: PlyElement, rows: NDArray) -> Columns:
 
 
 def _ragged_columns(
-    element: PlyElement, order: str, body: bytes, start: int
+    element: PlyElement, order: str, body: memoryview, start: int
 ) -> tuple[Columns, int]:
     """Rows of differing lengths: one pass finds where everything lies, then bulk copies."""
     begins, lengths, end = _walk(element, order, body, start)
@@ -146,7 +152,7 @@ def _ragged_columns(
 
 
 def _walk(
-    element: PlyElement, order: str, body: bytes, start: int
+    element: PlyElement, order: str, body: memoryview, start: int
 ) -> tuple[IntArray, IntArray, int]:
     """Byte offsets and lengths (rows, properties) of all values, and the element's end."""
     sizes = [np.dtype(p.type).itemsize for p in element.properties]
@@ -155,8 +161,7 @@ def _walk(
         for p in element.properties
     ]
     steps = list(zip(sizes, readers, strict=True))
-    begins: list[int] = []
-    lengths: list[float] = []
+    begins, lengths = array("q"), array("d")
     at = start
     try:
         for _ in range(element.count):
@@ -172,14 +177,62 @@ def _walk(
         raise _BodyError(_TRUNCATED) from error
     if not start <= at <= len(body):
         raise _BodyError(_TRUNCATED)
-    counts = np.array(lengths).astype(np.int64)
-    if (counts != lengths).any() or counts.min() < 0:
+    told = np.frombuffer(lengths, np.float64)
+    counts = told.astype(np.int64)
+    if (counts != told).any() or counts.min() < 0:
         raise _BodyError("a list's length is not a whole number from 0 up")
     shape = (element.count, len(steps))
-    return np.array(begins, dtype=np.int64).reshape(shape), counts.reshape(shape), at
+    return np.frombuffer(begins, np.int64).reshape(shape), counts.reshape(shape), at
 
 
-def _gather(body: bytes, begins: IntArray, lengths: IntArray, dtype: np.dtype) -> NDArray:
+def _short_columns(
+    element: PlyElement, order: str, body: memoryview, start: int
+) -> tuple[Columns, int]:
+    """Rows of one list each, whose length is a byte: faces and range grids, often millions."""
+    (prop,) = element.properties
+    dtype = np.dtype(order + prop.type)
+    octets = np.frombuffer(body, np.uint8)
+    lengths, end = _short_lengths(octets, start, element.count, dtype.itemsize)
+    if end > len(body):
+        raise _BodyError(_TRUNCATED)
+    values = _short_values(octets, start, lengths, dtype.itemsize).view(dtype)
+    return {prop.name: Ragged(lengths, values)}, end
+
+
+@njit(cache=True, nogil=True)
+def _short_lengths(
+    octets: ByteArray, start: int, count: int, size: int
+) -> tuple[ByteArray, int]:  # pragma: no cover - compiled
+    """Lengths (count,) of lists of values of a size, and where they end; past the end if cut."""
+    lengths = np.zeros(count, dtype=np.uint8)
+    at = start
+    for row in range(count):
+        if at >= len(octets):
+            return lengths, len(octets) + 1
+        lengths[row] = octets[at]
+        at += 1 + size * int(octets[at])
+    return lengths, at
+
+
+@njit(cache=True, nogil=True)
+def _short_values(
+    octets: ByteArray, start: int, lengths: ByteArray, size: int
+) -> ByteArray:  # pragma: no cover - compiled
+    """The octets of all values of such lists, one after the other."""
+    total = 0
+    for length in lengths:
+        total += size * int(length)
+    values = np.empty(total, dtype=np.uint8)
+    at, put = start, 0
+    for length in lengths:
+        step = size * int(length)
+        values[put : put + step] = octets[at + 1 : at + 1 + step]
+        at += 1 + step
+        put += step
+    return values
+
+
+def _gather(body: memoryview, begins: IntArray, lengths: IntArray, dtype: np.dtype) -> NDArray:
     """Values of all rows, one after the other, from the offsets where each row's begin."""
     before = np.cumsum(lengths) - lengths
     within = np.arange(int(lengths.sum())) - np.repeat(before, lengths)

@@ -1,7 +1,7 @@
 """What every reader hands over, and how it becomes a scan or a mesh."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ class RawScan:
     """A file's content as it stands there: points may be NaN, and indices out of range.
 
     Attributes as in ``RangeScan``; intensity (N,) uint8 is grey, used where there are no colours.
+    Readers hand their arrays over: nobody writes to them any more, so that scans may share them.
     """
 
     points: FloatArray
@@ -35,6 +36,12 @@ class RawScan:
     scan_from_sensor: Pose | None = None
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
 
 def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
     """The scan of a file: points that are not finite dropped, grid and faces re-indexed.
@@ -46,12 +53,14 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
         ReadError: If an index names no point, or no finite point is left.
     """
     finite = _checked(path, raw)
-    new_index = np.where(finite, np.cumsum(finite) - 1, -1)
     dropped = int((~finite).sum())
     if dropped == len(finite):
         raise ReadError(f"{path}: holds no points, or none that is finite; leave it out")
-    grid = None if raw.grid is None else np.where(raw.grid >= 0, new_index[raw.grid], -1)
-    faces = None if raw.faces is None or not len(raw.faces) else _whole(new_index[raw.faces])
+    grid, faces = raw.grid, raw.faces if raw.faces is not None and len(raw.faces) else None
+    if dropped:
+        new_index = np.where(finite, np.cumsum(finite) - 1, -1)
+        grid = None if grid is None else np.where(grid >= 0, new_index[grid], -1)
+        faces = None if faces is None else _whole(new_index[faces])
     colors = raw.colors
     notes = raw.notes
     if colors is None and raw.intensity is not None:
@@ -63,7 +72,7 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
         logger.info("%s: %d points that are not finite dropped", path, dropped)
     return RangeScan(
         name=name,
-        points=raw.points[finite],
+        points=raw.points[finite] if dropped else raw.points,
         grid=grid,
         faces=faces,
         normals=None if raw.normals is None else _zero_unless_finite(raw.normals[finite]),

@@ -1,6 +1,7 @@
 """Numbers in text, parsed in bulk, with the line of the first that is none."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 
+_BLOCK = 2**22
 _NOT_A_NUMBER = re.compile(rb"[+-]?(nan(\(\w*\))?|1\.?#(qnan|snan|ind)\d*)", re.IGNORECASE)
 """How some C libraries print what is not a number: nan(ind), -1.#IND00."""
 
@@ -24,7 +26,7 @@ def parse_numbers(path: Path, text: bytes, first_line: int = 1) -> FloatArray:
         ReadError: If something in the text is no number.
     """
     try:
-        return np.fromiter(map(float, text.split()), dtype=np.float64)
+        return np.fromiter(map(float, _words(text)), dtype=np.float64)
     except ValueError:  # rare: look word by word, to accept odd spellings and to name the line
         words = (
             (word, number)
@@ -32,6 +34,16 @@ def parse_numbers(path: Path, text: bytes, first_line: int = 1) -> FloatArray:
             for word in line.split()
         )
         return np.array([_number(path, word, number) for word, number in words], dtype=np.float64)
+
+
+def _words(text: bytes) -> Iterator[bytes]:
+    """All words of a text; a few megabytes at a time, as each takes many times its letters."""
+    start = 0
+    while start < len(text):
+        end = text.find(b"\n", start + _BLOCK)
+        end = len(text) if end < 0 else end
+        yield from text[start:end].split()
+        start = end
 
 
 def is_number(word: bytes) -> bool:

@@ -8,7 +8,7 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.scan import RangeScan
 
-CELLS_PER_POINT = 4
+CELLS_PER_POINT = 8
 """Cells of a range grid for each of its points, at most: empty ones take room as well."""
 SLACK = 1.02
 """Cells of space grow at least by this until few enough are left."""
@@ -33,8 +33,8 @@ def thinned(scan: RangeScan, max_points: int) -> RangeScan:
 
 def _strided(scan: RangeScan, grid: IntArray, max_points: int) -> tuple[RangeScan, str]:
     """Every k-th row and column of the grid, k as small as it can be."""
-    most = max(np.sqrt((grid >= 0).sum() / max_points), np.sqrt(grid.size / max_points) / 2)
-    step = max(2, int(np.ceil(most)))
+    too_many = max((grid >= 0).sum(), grid.size / CELLS_PER_POINT) / max_points
+    step = max(2, int(np.ceil(np.sqrt(too_many))))
     while (count := int((grid[::step, ::step] >= 0).sum())) > max_points:
         step += 1
     if count == 0:
@@ -66,7 +66,9 @@ def _in_cubes(scan: RangeScan, max_points: int) -> tuple[RangeScan, str]:
     centred = scan.points - scan.points.mean(axis=0)
     _, axes = np.linalg.eigh(centred.T @ centred)
     along = centred @ axes
-    edge = float(np.ptp(along, axis=0).max()) / np.sqrt(max_points)
+    low, high = np.percentile(along, [0.1, 99.9], axis=0)  # strays do not count
+    rounding = float(np.spacing(np.abs(scan.points).max()))
+    edge = max(float((high - low).max()) / (4 * np.sqrt(max_points)), rounding)
     while True:
         cube_of = _cubes(along, edge)
         count = int(cube_of.max()) + 1
@@ -87,11 +89,12 @@ def _in_cubes(scan: RangeScan, max_points: int) -> tuple[RangeScan, str]:
 
 def _cubes(along: FloatArray, edge: float) -> IntArray:
     """Number (N,) of the cube that each point lies in; cubes are numbered from 0 without gaps."""
-    cell = np.rint(along / edge).astype(np.int64)
-    cell -= cell.min(axis=0)
-    shape = cell.max(axis=0) + 1
-    flat = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
-    return np.unique(flat, return_inverse=True)[1].astype(np.int64)
+    cell = np.rint(along / edge)
+    order = np.lexsort(cell.T)
+    is_next = (cell[order[1:]] != cell[order[:-1]]).any(axis=1)
+    cube_of = np.empty(len(cell), dtype=np.int64)
+    cube_of[order] = np.append(0, np.cumsum(is_next))
+    return cube_of
 
 
 def _central(along: FloatArray, edge: float, cube_of: IntArray) -> IntArray:
