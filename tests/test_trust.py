@@ -225,7 +225,7 @@ def test_outcomes_come_back_from_their_records():
     assert again.pairs == outcome.pairs
     for kind in PairKind:
         pair = PairOutcome(
-            confidence=None, kind=str(kind), is_accepted=False, is_right=False, is_open=True
+            confidence=0.125, kind=str(kind), is_accepted=False, is_right=False, is_open=True
         )
         assert PairOutcome.of(pair.brief()) == pair
 

@@ -117,7 +117,6 @@ def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     """Poses that are asserted although several explain what the scans show."""
     open_scans = [s for s in scans_of(outcomes) if s.is_open]
     open_pairs = [p for p in posed_pairs(outcomes) if p.is_open]
-    stated = [each.confidence for each in (*open_scans, *open_pairs)]
     asserted = [
         sum((each.confidence or 0.0) > ASSERTED for each in some)
         for some in (open_scans, open_pairs)
@@ -127,7 +126,7 @@ def _asserted(outcomes: Sequence[Outcome]) -> Floor:
         asked="0",
         reached=f"{asserted[0]} of {len(open_scans)} scans, "
         f"{asserted[1]} of {len(open_pairs)} pairs",
-        is_met=sum(asserted) == 0 if any(c is not None for c in stated) else None,
+        is_met=sum(asserted) == 0 if open_scans else None,
     )
 
 
@@ -174,22 +173,22 @@ def _scale(outcomes: Sequence[Outcome]) -> Floor:
 
 
 def _confidence(outcomes: Sequence[Outcome]) -> list[Floor]:
-    stated = [(p.confidence, p.is_right) for p in posed_pairs(outcomes) if p.confidence is not None]
-    confidences, is_right = [c for c, _ in stated], [r for _, r in stated]
-    area = auc(confidences, is_right) if stated else float("nan")
+    pairs = posed_pairs(outcomes)
+    confidences, is_right = [p.confidence for p in pairs], [p.is_right for p in pairs]
+    area = auc(confidences, is_right)
     error = calibration_error(confidences, is_right)
     return [
         Floor(
             measure="confidence of pairs, right against wrong: AUC",
             asked=f">= {MIN_AUC:g}",
-            reached=f"{area:.4f} of {len(stated)} pairs, {sum(is_right)} right",
-            is_met=area >= MIN_AUC if stated else None,
+            reached=f"{area:.4f} of {len(pairs)} pairs, {sum(is_right)} right",
+            is_met=area >= MIN_AUC if pairs else None,
         ),
         Floor(
             measure="the same: expected calibration error",
             asked=f"<= {MAX_CALIBRATION_ERROR:g}",
             reached=f"{error:.4f}",
-            is_met=error <= MAX_CALIBRATION_ERROR if stated else None,
+            is_met=error <= MAX_CALIBRATION_ERROR if pairs else None,
         ),
     ]
 

@@ -77,15 +77,10 @@ def block(name: str, results: Results) -> str:
 def write_page(folder: Path) -> None:
     """Draw its pictures, and write the measured parts of the folder's page anew."""
     results = Results(folder)
-    if (folder / "data/trust.json").exists() and _is_stated(results):
+    if (folder / "data/trust.json").exists():
         draw(results.outcomes, folder)
     page = folder / PAGE
     write_whole(page, page_text(page.read_text(encoding="utf-8"), results).encode())
-
-
-def _is_stated(results: Results) -> bool:
-    """Whether confidences were stated at all."""
-    return bool(stated_pairs(results.outcomes) and stated_scans(results.outcomes))
 
 
 def _told(results: Results) -> str:
@@ -98,8 +93,6 @@ def _told(results: Results) -> str:
 
 
 def _confidence(results: Results) -> str:
-    if not _is_stated(results):
-        return NOT_YET
     stated = {"pairs": stated_pairs(results.outcomes), "scans": stated_scans(results.outcomes)}
     table = markdown_table(
         ("confidence of", "number", "right", "AUC", "calibration error", "Brier score"),

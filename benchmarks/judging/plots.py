@@ -17,15 +17,14 @@ Stated = list[tuple[float, bool]]
 
 
 def stated_pairs(outcomes: Sequence[Outcome]) -> Stated:
-    """Of all pairs that have a pose and a confidence."""
-    pairs = posed_pairs(outcomes)
-    return [(p.confidence, p.is_right) for p in pairs if p.confidence is not None]
+    """Of all pairs that have a pose."""
+    return [(pair.confidence, pair.is_right) for pair in posed_pairs(outcomes)]
 
 
 def stated_scans(outcomes: Sequence[Outcome]) -> Stated:
-    """Of all placed scans that have a confidence; one whose pose is open is not right."""
+    """Of all placed scans: whether they are right beside the others of their component."""
     return [
-        (scan.confidence, scan.is_right and not scan.is_open)
+        (scan.confidence, scan.standing == Standing.RIGHT and not scan.is_open)
         for scan in scans_of(outcomes)
         if scan.confidence is not None and scan.standing != Standing.UNPLACED
     ]

@@ -109,14 +109,15 @@ def rival_table(records: Sequence[Record], outcomes: Sequence[Outcome]) -> str:
 
 
 def answers_by_tool(records: Sequence[Record], outcomes: Sequence[Outcome]) -> dict[str, Answers]:
-    """The answers of each tool to the pairs that all were given; ours where it is stated."""
+    """The answers of each tool to the pairs that all were given."""
     runs = {(outcome.scenario, outcome.seed): outcome for outcome in outcomes}
     common = [r for r in records if (r.unit["scenario"], r.unit["seed"]) in runs]
-    own: Answers = []
-    for record in common:
-        for pair in runs[record.unit["scenario"], record.unit["seed"]].pairs:
-            if pair is not None and pair.confidence is not None:
-                own.append((pair.confidence, pair.is_right))
+    own = [
+        (pair.confidence, pair.is_right)
+        for record in common
+        for pair in runs[record.unit["scenario"], record.unit["seed"]].pairs
+        if pair is not None
+    ]
     others = {
         name: [
             (told[0], bool(told[1]))

@@ -13,7 +13,7 @@ CODE = (
     "benchmarks/virtual/*.py",
     "benchmarks/judging/trial.py",
 )
-QUICK = ("ring of 6", "mirrored scan", "gear")
+QUICK = ("64 pixels across", "crop to a ball", "plate")
 """One run each of these shows whether all works."""
 
 

@@ -47,7 +47,7 @@ class ScanOutcome:
         verdict: Good, doubtful or unplaced.
         standing: Right, wrong or unplaced.
         is_apart: Whether it lies in another component than most of its world.
-        confidence: That its pose is right, as the report says.
+        confidence: That its pose is right, as the report says; None if it is unplaced.
         rotation_deg: Error of its pose; None where there is none.
         translation_percent: The same, in percent of the object's diameter.
         reason: What the report says of it, where it is not both good and right.
@@ -103,7 +103,7 @@ class PairOutcome:
         is_open: Whether nothing that the two show determines it.
     """
 
-    confidence: float | None
+    confidence: float
     kind: str
     is_accepted: bool
     is_right: bool
@@ -112,8 +112,7 @@ class PairOutcome:
     def brief(self) -> list[Any]:
         """For JSON: thousands of these stand in it."""
         flags = (self.is_accepted, self.is_right, self.is_open)
-        stated = None if self.confidence is None else round(self.confidence, 4)
-        return [stated, self.kind[0], *map(int, flags)]
+        return [round(self.confidence, 4), self.kind[0], *map(int, flags)]
 
     @classmethod
     def of(cls, values: list[Any]) -> Self:
@@ -238,7 +237,7 @@ def _scan_outcome(
         verdict=str(report.verdict),
         standing=str(error.standing if error else Standing.UNPLACED),
         is_apart=_is_apart(name, found, scene),
-        confidence=getattr(report, "confidence", None),
+        confidence=report.confidence,
         rotation_deg=error.rotation_deg if error and is_known else None,
         translation_percent=100 * error.translation / scene.diameter
         if error and is_known
@@ -266,7 +265,7 @@ def _pair_outcome(report: PairReport | None, scene: Scene) -> PairOutcome | None
     i, j = report.i, report.j
     is_open = i in scene.is_open or j in scene.is_open
     return PairOutcome(
-        confidence=getattr(report, "confidence", None),
+        confidence=report.confidence,
         kind=str(report.kind),
         is_accepted=report.accepted,
         is_right=not is_open and is_right_pair(i, j, report.i_from_j, scene),
