@@ -96,7 +96,10 @@ def made_record(seed: int) -> Record:
             "name": name,
             "component": 0,
             "reference": name == "b",
-            "grounds": {"margin": float(rng.normal(2.0 * is_right)), "link": 0.0},
+            "grounds": {
+                "agree": float(rng.normal(2.0 * is_right)),
+                **{"margin": 1.0, "observability": -1.0, "link": 0.0},
+            },
             "right": is_right,
         }
         for name in "abc"

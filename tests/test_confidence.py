@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scanweld.confidence.assess import OPEN, assess
 from scanweld.confidence.joint_evidence import joint_evidence
 from scanweld.confidence.links import links
-from scanweld.confidence.misfit import misfit, patch_means
+from scanweld.confidence.misfit import misfit, sure_offsets
 from scanweld.confidence.model import (
     MAX_CONFIDENCE,
     Curve,
@@ -140,10 +140,11 @@ def test_noise_is_averaged_out_of_the_misfit_but_steps_are_not():
     noise = rng.normal(scale=0.01, size=4000)
     stepped = flat_matches(noise)
     stepped = replace(stepped, residuals=noise + 0.01 * (stepped.points[:, 0] > 0.7))
-    noisy = misfit(patch_means(flat_matches(noise), 0.1))
-    assert noisy < 0.004
-    assert misfit(patch_means(stepped, 0.1)) > 2 * noisy
-    assert misfit(patch_means(flat_matches(noise[:3]), 0.1)) == np.inf
+    noisy = misfit(sure_offsets(flat_matches(noise), 0.1))
+    assert noisy < 0.001
+    assert 0.006 < misfit(sure_offsets(stepped, 0.1)) < 0.01
+    assert misfit(sure_offsets(flat_matches(noise[:3]), 0.1)) == np.inf
+    assert misfit(sure_offsets(flat_matches(noise[:0]), 0.1)) == np.inf
 
 
 def evidence(agree: float) -> Evidence:
@@ -249,7 +250,7 @@ def planted(pair: PreparedPair, i_from_j: Pose, kind: PairKind = PairKind.GOOD) 
     )
     judge = pair_judge(pair.fields, pair.diameter, config)
     witnesses = witnesses_of(pair.scans, pair.fields, pair.diameter, judge, config)
-    found = assess(graph, witnesses, stored_calibration())
+    found = assess(graph, witnesses, stored_calibration(), config)
     # No scan is surer than the only pair that holds it; links are whole numbers of their steps.
     assert max(found.scans[k].confidence for k in (0, 1)) < found.pairs[0, 1].confidence + 1e-3
     return found.pairs[0, 1].confidence

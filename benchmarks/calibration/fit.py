@@ -38,6 +38,10 @@ class Examples:
     def __len__(self) -> int:
         return len(self.is_right)
 
+    def rows(self) -> list[dict[str, float]]:
+        """The grounds of each, by name."""
+        return [dict(zip(self.names, row, strict=True)) for row in self.grounds.tolist()]
+
     def only(self, kept: BoolArray) -> "Examples":
         """Some of them."""
         return Examples(
@@ -87,10 +91,7 @@ def held_out_probabilities(examples: Examples) -> FloatArray:
     found = np.zeros(len(examples))
     for fold in folds(examples):
         model = fit(examples.only(~fold))
-        found[fold] = [
-            model.probability(dict(zip(examples.names, row, strict=True)))
-            for row in examples.grounds[fold]
-        ]
+        found[fold] = [model.probability(row) for row in examples.only(fold).rows()]
     return found
 
 

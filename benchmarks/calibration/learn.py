@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.calibration.collect import CONFIG
 from benchmarks.calibration.fit import Examples, fit, held_out_probabilities, make_examples
 from benchmarks.paper.study import Record
-from scanweld.confidence.assess import as_tied, close_open
+from scanweld.confidence.assess import as_held, close_open
 from scanweld.confidence.links import links
 from scanweld.confidence.model import Calibration
 from scanweld.geometry.arrays import FloatArray
@@ -54,7 +55,7 @@ def learn(records: Sequence[Record], command: str) -> Learned:
     probability = held_out_probabilities(pairs)
     pair_confidence = np.array(
         [
-            close_open(float(p), PairKind(pair["kind"]), pair["grounds"])
+            close_open(float(p), PairKind(pair["kind"]), pair["grounds"], CONFIG)
             for p, (_, pair) in zip(probability, rows, strict=True)
         ]
     )
@@ -67,15 +68,16 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         "scans": len(scans),
         "digest": digest.hexdigest()[:16],
     }
-    tied = scans.grounds[:, scans.names.index("link")]
-    alone = held_out_probabilities(scans)
     return Learned(
         calibration=Calibration(pair=fit(pairs), scan=fit(scans), made=made),
         pairs=pairs,
         scans=scans,
         pair_confidence=pair_confidence,
         scan_confidence=np.array(
-            [as_tied(p, link) for p, link in zip(alone.tolist(), tied.tolist(), strict=True)]
+            [
+                as_held(float(p), row, CONFIG)
+                for p, row in zip(held_out_probabilities(scans), scans.rows(), strict=True)
+            ]
         ),
     )
 

@@ -154,7 +154,7 @@ def assess_placed(
     judge_pair = pair_judge(fields, intake.diameter, config)
     with stages.stage("confidence") as counts:
         witnesses = witnesses_of(intake.prepared, fields, intake.diameter, judge_pair, config)
-        confidence = assess(graph, witnesses, stored_calibration())
+        confidence = assess(graph, witnesses, stored_calibration(), config)
         doubts = dict(graph.doubts)
         for k, found in confidence.scans.items():
             if found.confidence < config.confidence.min_good:

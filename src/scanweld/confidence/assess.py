@@ -4,11 +4,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from scanweld.confidence.grounds import Grounds, is_supported, pair_grounds, scan_grounds
+from scanweld.confidence.grounds import (
+    LEAST_OBSERVABILITY,
+    Grounds,
+    is_supported,
+    pair_grounds,
+    scan_grounds,
+)
 from scanweld.confidence.joint_evidence import JointEvidence, joint_evidence
 from scanweld.confidence.links import links
 from scanweld.confidence.model import Calibration
 from scanweld.confidence.witnesses import Witnesses
+from scanweld.config import Config
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 
@@ -34,37 +41,50 @@ class Confidence:
     scans: Mapping[int, Assessed] = field(default_factory=dict)
 
 
-def assess(graph: ViewGraph, witnesses: Witnesses, calibration: Calibration) -> Confidence:
+def assess(
+    graph: ViewGraph, witnesses: Witnesses, calibration: Calibration, config: Config
+) -> Confidence:
     """Give every pair that has a pose, and every placed scan, its confidence.
 
     Args:
         graph: The view graph with its final poses.
         witnesses: All scans of the run.
         calibration: The models.
+        config: Settings: what leaves a pose open.
     """
     homes: dict[int, JointEvidence] = {}
     for component in graph.components:
         joint = joint_evidence(graph, component, witnesses)
         homes.update(dict.fromkeys(component.poses, joint))
     pairs = {
-        edge: _assess_pair(result, chosen, graph, homes, witnesses, calibration)
+        edge: _assess_pair(result, chosen, graph, homes, witnesses, calibration, config)
         for edge, result in graph.pairs.items()
         if (chosen := graph.accepted.get(edge) or result.best) is not None
     }
-    return Confidence(pairs=pairs, scans=_assess_scans(graph, homes, pairs, calibration))
+    return Confidence(pairs=pairs, scans=_assess_scans(graph, homes, pairs, calibration, config))
 
 
-def close_open(probability: float, kind: PairKind, grounds: Grounds) -> float:
-    """A pair's probability, at most ``OPEN`` if its two scans and no others leave it open."""
-    is_open = kind in (PairKind.SLIDING, PairKind.AMBIGUOUS)
-    return (
-        min(probability, OPEN) if is_open and not is_supported(grounds["support"]) else probability
-    )
+def close_open(probability: float, kind: PairKind, grounds: Grounds, config: Config) -> float:
+    """A pair's probability, at most ``OPEN`` if nothing decides what its two scans leave open."""
+    if kind not in (PairKind.SLIDING, PairKind.AMBIGUOUS):
+        return probability
+    is_decided = is_supported(grounds["support"]) and not _is_open(grounds, config)
+    return probability if is_decided else min(probability, OPEN)
 
 
-def as_tied(probability: float, link: float) -> float:
-    """A scan's probability, at most that of what ties it to the others."""
-    return min(probability, 1.0 - math.exp(-link))
+def as_held(probability: float, grounds: Grounds, config: Config) -> float:
+    """A scan's probability, at most that of what ties it to the others.
+
+    At most ``OPEN`` if all others together leave its place open.
+    """
+    tied = min(probability, 1.0 - math.exp(-grounds["link"]))
+    return min(tied, OPEN) if _is_open(grounds, config) else tied
+
+
+def _is_open(grounds: Grounds, config: Config) -> bool:
+    """Whether another place fits nearly as well, or the surfaces slide on each other."""
+    least = math.log10(max(config.pairs.min_observability, LEAST_OBSERVABILITY))
+    return grounds["margin"] < config.graph.min_margin or grounds["observability"] < least
 
 
 def _assess_pair(
@@ -74,6 +94,7 @@ def _assess_pair(
     homes: Mapping[int, JointEvidence],
     witnesses: Witnesses,
     calibration: Calibration,
+    config: Config,
 ) -> Assessed:
     is_accepted = (result.i, result.j) in graph.accepted
     joint = homes.get(result.i)
@@ -84,7 +105,7 @@ def _assess_pair(
     grounds = pair_grounds(result, chosen, looks, joint, is_accepted)
     probability = calibration.pair.probability(grounds)
     if (result.i, result.j) not in graph.remarks:
-        probability = close_open(probability, result.kind, grounds)
+        probability = close_open(probability, result.kind, grounds, config)
     return Assessed(confidence=probability, grounds=grounds)
 
 
@@ -93,6 +114,7 @@ def _assess_scans(
     homes: Mapping[int, JointEvidence],
     pairs: Mapping[Edge, Assessed],
     calibration: Calibration,
+    config: Config,
 ) -> dict[int, Assessed]:
     accepted = {edge: pairs[edge] for edge in graph.accepted}
     scans: dict[int, Assessed] = {}
@@ -101,6 +123,6 @@ def _assess_scans(
         for k in sorted(component.poses):
             own = [pair.grounds["coherence"] for edge, pair in accepted.items() if k in edge]
             grounds = scan_grounds(k, homes[k], tied[k], max(own, default=0.0))
-            confidence = as_tied(calibration.scan.probability(grounds), tied[k])
+            confidence = as_held(calibration.scan.probability(grounds), grounds, config)
             scans[k] = Assessed(confidence=confidence, grounds=grounds)
     return scans

@@ -6,14 +6,21 @@ from itertools import combinations
 
 import numpy as np
 
-from scanweld.confidence.misfit import misfit, two_way_misfits
+from scanweld.confidence.misfit import misfit, two_way_offsets
 from scanweld.confidence.witnesses import Looks, Witnesses, over
 from scanweld.geometry.pose import Pose
 from scanweld.multiview.merge import Merge, Poses, is_near, propose_merges
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.information import information_from, observability_of, two_way_matches
 from scanweld.pairs.register import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
-from scanweld.pairs.result import Evidence, margin_over
+from scanweld.pairs.result import (
+    AS_CLEAN,
+    CLEAN_SHARE,
+    MIN_AGREE,
+    MIN_RIVAL_SHARE,
+    Evidence,
+    margin_over,
+)
 
 MIN_CONDUCTANCE = 0.02
 """Accepted pairs conduct by their score, and none less than this."""
@@ -78,7 +85,6 @@ def _margin(
     near = (RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS * witnesses.diameter)
     alone = {k: Pose.identity()}
     merges = propose_merges(others, alone, graph.pairs, centres, near, witnesses.judge)
-    rivals = [m.score for m in merges if not is_near(m.a_from_b, poses[k], centres[k], near)]
     said = _said_of(k, between)
     here = Merge(
         a_from_b=poses[k],
@@ -88,7 +94,23 @@ def _margin(
         free=sum(e.free for e in said),
         worst=0.0,
     )
-    return max(margin_over(here.score, rivals), -1.0)
+    rivals = [m for m in merges if not is_near(m.a_from_b, poses[k], centres[k], near)]
+    return max(margin_over(here.score, [_rival_score(rival, here) for rival in rivals]), -1.0)
+
+
+def _rival_score(rival: Merge, here: Merge) -> float:
+    """What another place of a scan scores, as ``rival_score`` has it of a pair.
+
+    A place that is contradicted no more counts as if the scan overlapped there as much as here.
+    """
+    bearable = max(CLEAN_SHARE, AS_CLEAN * _violated(here))
+    if rival.agree < MIN_RIVAL_SHARE * here.agree or _violated(rival) > bearable:
+        return rival.score
+    return rival.score * max(1.0, here.agree / rival.agree)
+
+
+def _violated(merge: Merge) -> float:
+    return (merge.violated + merge.free) / max(merge.agree, MIN_AGREE)
 
 
 def _said_of(scan: int, between: Mapping[Edge, Evidence]) -> list[Evidence]:
@@ -103,7 +125,7 @@ def _looks(k: int, poses: Poses, witnesses: Witnesses) -> Looks:
     found = [two_way_matches(fields[k], fields[m], pose, tolerance) for m, pose in k_from.items()]
     information, rms, _ = information_from(found, diameter)
     patches = [
-        two_way_misfits(sources[k], sources[m], pose, tolerance, diameter)
+        two_way_offsets(sources[k], sources[m], pose, tolerance, diameter)
         for m, pose in k_from.items()
     ]
     return Looks(

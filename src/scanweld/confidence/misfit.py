@@ -16,6 +16,9 @@ PATCH_DIAMETERS = 0.06
 """Edge of the cells over which residuals are averaged."""
 MIN_PATCH_POINTS = 6
 """Points that make a mean."""
+SURE_DEVIATIONS = 2.0
+"""Standard deviations of its mean that are taken off how far a patch lies off: noise explains so
+much."""
 WORST_SHARE = 0.1
 """Share of the patches that may lie farther off than what is told: poor borders, say."""
 REACH_TOLERANCES = 2.0
@@ -34,30 +37,39 @@ def pair_misfit(
         tolerance: Depth tolerance of the evidence, in the scans' unit.
         diameter: Diameter of the run.
     """
-    return misfit(two_way_misfits(i, j, i_from_j, tolerance, diameter)) / tolerance
+    return misfit(two_way_offsets(i, j, i_from_j, tolerance, diameter)) / tolerance
 
 
-def two_way_misfits(
+def two_way_offsets(
     i: SurfaceSource, j: SurfaceSource, i_from_j: Pose, tolerance: float, diameter: float
 ) -> FloatArray:
-    """Mean residual (P,) of each patch of one scan on the other, both ways."""
+    """How far each patch of one scan surely lies off the other, (P,), both ways."""
     reach, patch = REACH_TOLERANCES * tolerance, PATCH_DIAMETERS * diameter
     return np.concatenate(
         [
-            patch_means(surface_matches(i, j, i_from_j.inverse(), reach), patch),
-            patch_means(surface_matches(j, i, i_from_j, reach), patch),
+            sure_offsets(surface_matches(i, j, i_from_j.inverse(), reach), patch),
+            sure_offsets(surface_matches(j, i, i_from_j, reach), patch),
         ]
     )
 
 
-def misfit(means: FloatArray) -> float:
+def misfit(offsets: FloatArray) -> float:
     """How far patches (P,) lie off, all but the worst tenth; infinite where there are none."""
-    return float(np.quantile(np.abs(means), 1.0 - WORST_SHARE)) if len(means) else float("inf")
+    return float(np.quantile(offsets, 1.0 - WORST_SHARE)) if len(offsets) else float("inf")
 
 
-def patch_means(matches: Matches, patch: float) -> FloatArray:
-    """Mean residual (P,) of the matches in each cell of that edge that has enough."""
+def sure_offsets(matches: Matches, patch: float) -> FloatArray:
+    """Mean distance (P,) of the matches in each cell of that edge, less what noise explains.
+
+    The noise is that within cells, of all of them together. Cells with few matches are left out.
+    """
+    if not len(matches):
+        return np.zeros(0)
     cells = np.floor(matches.points / patch).astype(np.int64)
     _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    total = np.bincount(cell.ravel(), weights=matches.residuals, minlength=len(count))
-    return (total / count)[count >= MIN_PATCH_POINTS]
+    cell = cell.ravel()
+    mean = np.bincount(cell, weights=matches.residuals) / count
+    within = float(((matches.residuals - mean[cell]) ** 2).sum())
+    noise = np.sqrt(within / max(len(cell) - len(count), 1) / count)
+    sure = np.maximum(np.abs(mean) - SURE_DEVIATIONS * noise, 0.0)
+    return sure[count >= MIN_PATCH_POINTS]
