@@ -9,7 +9,7 @@ import numpy as np
 
 from scanweld.confidence.joint_evidence import JointEvidence
 from scanweld.confidence.witnesses import Looks
-from scanweld.pairs.result import Alternative, Evidence, PairResult, margin_among
+from scanweld.pairs.result import Alternative, Evidence, PairResult, margin_among, refutation_among
 
 Grounds = Mapping[str, float]
 
@@ -41,6 +41,7 @@ def pair_grounds(
     """
     observability = looks.observability
     margin = margin_among(chosen, result.alternatives)
+    refutation = refutation_among(chosen, result.alternatives)
     support = opposition = consent = 0.0
     if joint is not None and not is_accepted:
         opposition = -joint.conductance[result.i, result.j]
@@ -50,10 +51,12 @@ def pair_grounds(
         if is_supported(support):
             both = result.i, result.j
             margin = max(margin, min(joint.margins[k] for k in both))
+            refutation = max(refutation, min(joint.refutations[k] for k in both))
             observability = max(observability, min(joint.looks[k].observability for k in both))
     return {
         **_of_evidence(chosen.evidence),
         "margin": max(margin, -1.0),
+        "refutation": refutation,
         "observability": float(np.log10(max(observability, LEAST_OBSERVABILITY))),
         "coherence": looks.coherence,
         "residual": -looks.residual,
@@ -80,6 +83,7 @@ def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) ->
         "consent": -violated(said),
         "free": -sum(e.free for e in said) / max(agree, LEAST_SHARE),
         "margin": joint.margins[k],
+        "refutation": joint.refutations[k],
         "observability": float(np.log10(max(looks.observability, LEAST_OBSERVABILITY))),
         "coherence": coherence,
         "residual": -looks.residual,

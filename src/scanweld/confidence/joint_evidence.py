@@ -18,8 +18,10 @@ from scanweld.pairs.result import (
     CLEAN_SHARE,
     MIN_AGREE,
     MIN_RIVAL_SHARE,
+    MIN_TOLD_SHARE,
     Evidence,
     margin_over,
+    refutation,
 )
 
 MIN_CONDUCTANCE = 0.02
@@ -36,6 +38,7 @@ class JointEvidence:
         between: Evidence on all pairs (i, j), i < j, at the component's poses.
         margins: For each scan, the share of the score of its place by which that beats the best
             distinct place that any pair proposes for it, as all others judge it.
+        refutations: For each scan, how clearly such places are refuted.
         looks: How each scan lies on all others together; their coherence is left to pairs.
         conductance: Between any two scans through accepted pairs, each of which conducts by its
             score: a short way, a strong way and many ways are all better.
@@ -43,6 +46,7 @@ class JointEvidence:
 
     between: Mapping[Edge, Evidence]
     margins: Mapping[int, float]
+    refutations: Mapping[int, float]
     looks: Mapping[int, Looks]
     conductance: Mapping[Edge, float]
 
@@ -68,18 +72,28 @@ def joint_evidence(graph: ViewGraph, component: Component, witnesses: Witnesses)
         (i, j): witnesses.judge(i, j, poses[i].inverse() @ poses[j])
         for i, j in combinations(sorted(poses), 2)
     }
+    standings = {k: _standing(k, graph, poses, between, witnesses) for k in sorted(poses)}
     return JointEvidence(
         between=between,
-        margins={k: _margin(k, graph, poses, between, witnesses) for k in sorted(poses)},
+        margins={k: standing.margin for k, standing in standings.items()},
+        refutations={k: standing.refutation for k, standing in standings.items()},
         looks={k: _looks(k, poses, witnesses) for k in sorted(poses)},
         conductance=_conductance(graph, component),
     )
 
 
-def _margin(
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Standing:
+    """How the place of a scan compares with others: its margin, and how clearly they are refuted."""
+
+    margin: float
+    refutation: float
+
+
+def _standing(
     k: int, graph: ViewGraph, poses: Poses, between: Mapping[Edge, Evidence], witnesses: Witnesses
-) -> float:
-    """The margin of a scan's place over other places, all other scans being where they are."""
+) -> _Standing:
+    """The place of a scan beside other places, all other scans being where they are."""
     others = {m: pose for m, pose in poses.items() if m != k}
     centres = [field.centre for field in witnesses.fields]
     near = (RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS * witnesses.diameter)
@@ -95,7 +109,12 @@ def _margin(
         worst=0.0,
     )
     rivals = [m for m in merges if not is_near(m.a_from_b, poses[k], centres[k], near)]
-    return max(margin_over(here.score, [_rival_score(rival, here) for rival in rivals]), -1.0)
+    margin = margin_over(here.score, [_rival_score(rival, here) for rival in rivals])
+    least = max(MIN_AGREE, MIN_TOLD_SHARE * here.agree)
+    return _Standing(
+        margin=max(margin, -1.0),
+        refutation=refutation([_violated(rival) for rival in rivals if rival.agree >= least]),
+    )
 
 
 def _rival_score(rival: Merge, here: Merge) -> float:

@@ -22,8 +22,10 @@ MIN_AGREE = 0.05
 CLEAN_SHARE, AS_CLEAN = 0.15, 1.3
 """A rival is contradicted no more than a pose if its violations, as a share of what agrees, are
 within the first, or within so many times those of the pose."""
-MIN_RIVAL_SHARE = 0.15
+MIN_RIVAL_SHARE = 0.35
 """Least agreement of such a rival, as a share of that of the pose: slivers fit in many ways."""
+MIN_TOLD_SHARE = 0.15
+"""The same of a rival of which one wants to know how much contradicts it."""
 
 
 MARGIN_WEIGHT = 2.0
@@ -161,6 +163,25 @@ def margin_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> fl
     """Margin of one of a pair's poses over the others."""
     others = [option for option in alternatives if option is not chosen]
     return margin_over(chosen.score, [rival_score(other, chosen) for other in others])
+
+
+def refutation(violated: Sequence[float]) -> float:
+    """How clearly the least contradicted rival of a pose is refuted.
+
+    Args:
+        violated: Violations of each rival, as a share of what agrees.
+
+    Returns:
+        That share for the best rival, at most 1: that of a pose without rivals.
+    """
+    return min([1.0, *violated])
+
+
+def refutation_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> float:
+    """How clearly the others of a pair's poses are refuted."""
+    least = max(MIN_AGREE, MIN_TOLD_SHARE * chosen.evidence.agree)
+    rivals = [other.evidence for other in alternatives if other is not chosen]
+    return refutation([told.violation / told.agree for told in rivals if told.agree >= least])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
