@@ -197,6 +197,12 @@ def test_facts_that_cannot_be_meant_exit_with_2(
     assert not Path("model").exists() and not work_folder(Path("model")).exists()
 
 
+def test_the_package_runs_as_a_module():
+    asked = [sys.executable, "-m", "scanweld", "--version"]
+    told = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    assert re.search(r"\d+\.\d+", told)
+
+
 def test_version_and_help(capsys: pytest.CaptureFixture[str]):
     assert scanweld("--version") == 0
     assert capsys.readouterr().out.startswith("scanweld 0.")

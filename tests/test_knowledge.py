@@ -420,3 +420,9 @@ def test_files_that_are_no_facts_are_named(tmp_path: Path, text: str, told: str)
     with pytest.raises(KnowledgeError, match=told) as raised:
         read_knowledge(file)
     assert str(file) in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_file_of_facts_that_is_not_there_is_named(tmp_path: Path):
+    with pytest.raises(KnowledgeError, match="facts.json: No such file") as raised:
+        read_knowledge(tmp_path / "facts.json")
+    assert "correct it" not in str(raised.value)

@@ -149,7 +149,10 @@ def read_knowledge(path: Path | str) -> Knowledge:
         where = ".".join(str(part) for part in first["loc"]) or "the file"
         wrong = "no such fact" if first["type"] == "extra_forbidden" else first["msg"]
         raise KnowledgeError(f"{path}: {where}: {wrong}; correct it") from error
-    except (OSError, ValueError, RecursionError) as error:
+    except OSError as error:
+        reason = error.strerror or "no such file"
+        raise KnowledgeError(f"{path}: {reason}; name a JSON file that can be read") from error
+    except (ValueError, RecursionError) as error:
         raise KnowledgeError(f"{path}: cannot be read as JSON ({error}); correct it") from error
     facts = Knowledge(
         fix=told.fix, together=told.together, apart=told.apart, turntable=told.turntable

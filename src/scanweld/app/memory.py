@@ -61,7 +61,7 @@ def points_within(budget: int, files: Sequence[Path]) -> int:
     least = max(fixed + MIN_POINTS * (PER_POINT * n + each) for fixed, each in phases)
     if budget < least:
         largest = max(map(_size, files), default=0)
-        scans = f"{len(files)} scans with files of up to {largest / MEGABYTE:.0f} MB"
+        scans = f"{len(files)} scans with files of up to {-(-largest // MEGABYTE)} MB"
         raise BudgetError(
             f"--memory {budget // MEGABYTE}M: is too little for {scans}; "
             f"give at least {-(-least // MEGABYTE)}M, or fewer scans"
