@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.result import Alternative, Evidence, PairKind, margin_among
+from scanweld.pairs.result import Alternative, Evidence, PairKind, margin_among, refutation_among
 from scanweld.pairs.verdict import classify_pair
 from tests.results import turned
 
@@ -22,10 +22,15 @@ def margin(best: Evidence, rivals: list[Evidence]) -> float:
     return margin_among(options[0], options)
 
 
+def refuted(best: Evidence, rivals: list[Evidence]) -> float:
+    options = [Alternative(i_from_j=turned(k), evidence=e) for k, e in enumerate([best, *rivals])]
+    return refutation_among(options[0], options)
+
+
 def test_a_rival_that_nothing_contradicts_is_as_good_though_it_overlaps_less():
     """The next turn of a toothed wheel: fewer teeth meet, and all that meet fit."""
     assert margin(evidence(0.9, front=0.005), [evidence(0.5, front=0.003)]) < 0.05
-    assert margin(evidence(0.9), [evidence(0.2)]) == pytest.approx(0.0, abs=1e-12)
+    assert margin(evidence(0.9), [evidence(0.35)]) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_rival_that_is_contradicted_counts_by_its_score():
@@ -36,8 +41,8 @@ def test_a_rival_that_is_contradicted_counts_by_its_score():
 def test_slivers_are_no_rivals():
     best = evidence(0.6, front=0.01)
     assert margin(best, [evidence(0.04)]) > 0.9
-    assert margin(best, [evidence(0.08)]) > 0.8
-    assert margin(evidence(0.2), [evidence(0.06)]) == pytest.approx(0.0, abs=1e-12)
+    assert margin(best, [evidence(0.18)]) > 0.6, "a narrow view fits a third as well elsewhere"
+    assert margin(evidence(0.15), [evidence(0.06)]) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_rival_as_dirty_as_the_best_pose_counts_in_full():
@@ -55,6 +60,15 @@ def test_one_more_rival_never_makes_a_pose_surer(a: float, b: float, front: floa
     best, first = evidence(a, front=0.02 * a), evidence(0.3, front=0.05)
     rival = evidence(b, front=front, free=free)
     assert margin(best, [first, rival]) <= margin(best, [first])
+
+
+def test_how_clearly_rivals_are_refuted_is_told_by_the_least_contradicted_one():
+    best, poor, poorer = evidence(0.6), evidence(0.2, front=0.1), evidence(0.3, front=0.3)
+    assert refuted(best, [poor, poorer]) == pytest.approx(0.5)
+    assert refuted(best, [poorer]) == 1.0
+    assert refuted(best, [poorer, evidence(0.3)]) == 0.0
+    assert refuted(best, [evidence(0.08)]) == 1.0, "a sliver is no rival"
+    assert refuted(best, []) == 1.0
 
 
 def test_the_pair_of_a_toothed_wheel_is_ambiguous():
