@@ -12,7 +12,7 @@ from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 QUANTILES = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
 """Where a curve may bend."""
-PENALTY = 0.3
+PENALTY = 1.0
 """Of the squares of the curves' steps: steep only where many examples ask for it."""
 NUM_FOLDS = 5
 MIN_COUNTED = 20

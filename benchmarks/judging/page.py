@@ -107,8 +107,10 @@ def _confidence(results: Results) -> str:
 
 def _numbers(stated: Stated) -> tuple[str, ...]:
     confidences, is_right = [c for c, _ in stated], [r for _, r in stated]
+    are_both = any(is_right) and not all(is_right)
+    area = f"{auc(confidences, is_right):.4f}" if are_both else "- (none wrong)"
     return (
-        *(str(len(stated)), str(sum(is_right)), f"{auc(confidences, is_right):.4f}"),
+        *(str(len(stated)), str(sum(is_right)), area),
         f"{calibration_error(confidences, is_right):.4f}",
         f"{brier(confidences, is_right):.4f}",
     )
