@@ -18,12 +18,13 @@ from scanweld.intake import Intake
 from scanweld.multiview.assemble import Settle, build_view_graph
 from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.given import easier_verdict, pairs_as_given, with_given
-from scanweld.multiview.merge import Judge
+from scanweld.multiview.merge import Judge, Poses, Tell
 from scanweld.multiview.refine_graph import Refine, refine_graph
 from scanweld.multiview.scale import estimate_scales
 from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
+from scanweld.pairs.marks import Told, see, told_of
 from scanweld.pairs.result import Evidence, PairResult
 from scanweld.pairs.visibility import judge, mean_evidence
 from scanweld.reconstruction import FactReport
@@ -68,6 +69,20 @@ def pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> 
     return judge_pair
 
 
+def pixel_teller(fields: Sequence[ScanField], diameter: float, config: Config) -> Tell:
+    """What gives what all pixels of two components' scans say of each other."""
+    tolerance = config.pairs.tolerance_diameters[2] * diameter
+
+    def tell(a: Poses, b: Poses) -> list[Told]:
+        both = {
+            (i, j): see(fields[i], fields[j], a[i].inverse() @ b[j], diameter) for i in a for j in b
+        }
+        of_a = [told_of([both[i, j][0] for j in b], tolerance) for i in a]
+        return of_a + [told_of([both[i, j][1] for i in a], tolerance) for j in b]
+
+    return tell
+
+
 def place_scans(
     intake: Intake,
     fields: Sequence[ScanField],
@@ -99,6 +114,7 @@ def place_scans(
             settle,
             config.graph,
             given.apart,
+            pixel_teller(fields, intake.diameter, config),
         )
         graph = with_given(graph, pairs, given)
         counts["accepted"] = len(graph.accepted)

@@ -106,6 +106,8 @@ def _assess_pair(
     probability = calibration.pair.probability(grounds)
     if (result.i, result.j) not in graph.remarks:
         probability = close_open(probability, result.kind, grounds, config)
+    if result.is_marked:
+        probability = min(probability, OPEN)
     return Assessed(confidence=probability, grounds=grounds)
 
 

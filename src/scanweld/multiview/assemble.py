@@ -14,6 +14,7 @@ from scanweld.multiview.merge import (
     Merge,
     Poses,
     Support,
+    Tell,
     is_near,
     propose_merges,
     without,
@@ -52,6 +53,7 @@ class _Problem:
     centres: Sequence[FloatArray]
     near: tuple[float, float]
     judge: Judge
+    tell: Tell | None
     settle: Settle
     config: GraphConfig
     apart: Collection[Edge]
@@ -75,6 +77,7 @@ def build_view_graph(
     settle: Settle,
     config: GraphConfig,
     apart: Collection[Edge] = (),
+    tell: Tell | None = None,
 ) -> ViewGraph:
     """Place all scans that the pairs can place without contradiction.
 
@@ -92,6 +95,7 @@ def build_view_graph(
         settle: Refines a component's poses.
         config: Settings.
         apart: Pairs whose scans no merge may lay onto each other.
+        tell: Gives what all pixels of two components say of each other, where merges are tied.
     """
     near = (config.max_cycle_deg, config.max_cycle_diameters * diameter)
     problem = _Problem(
@@ -100,6 +104,7 @@ def build_view_graph(
         centres=centres,
         near=near,
         judge=judge,
+        tell=tell,
         settle=settle,
         config=config,
         apart=apart,
@@ -158,7 +163,9 @@ def _best_merge(
 def _merges(problem: _Problem, a: Poses, b: Poses) -> list[Merge]:
     key = _content(a), _content(b)
     if key not in problem.memory.merges:
-        merges = propose_merges(a, b, problem.pairs, problem.centres, problem.near, problem.judge)
+        merges = propose_merges(
+            a, b, problem.pairs, problem.centres, problem.near, problem.judge, problem.tell
+        )
         problem.memory.merges[key] = [m for m in merges if not _joins_apart(problem, a, b, m)]
     return problem.memory.merges[key]
 

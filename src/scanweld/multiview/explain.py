@@ -78,10 +78,26 @@ def _agreed(said: Sequence[Said]) -> tuple[Said | None, int]:
     return most, count if count >= MIN_ALIKE and 2 * count > len(said) else 0
 
 
+def _only_marked(graph: ViewGraph, component: Component) -> set[int]:
+    """Scans of a component that no good pairs join to most of it, but a mark alone."""
+    inside = {edge: graph.pairs[edge] for edge in graph.accepted if edge[0] in component.poses}
+    if not any(result.is_marked for result in inside.values()):
+        return set()
+    groups = [{k} for k in component.poses]
+    for edge, result in inside.items():
+        if result.kind is PairKind.GOOD:
+            joined = set().union(*(group for group in groups if group & set(edge)))
+            groups = [group for group in groups if not group & joined] + [joined]
+    most = max(groups, key=len)
+    return set(component.poses) - (most if len(most) > 1 else set())
+
+
 def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int, str]:
     """What speaks against the final poses of placed scans, by scan; known doubts stay."""
     doubts = dict(graph.doubts)
     for component in graph.components:
+        for k in _only_marked(graph, component):
+            doubts[k] = "only a small mark decides its pose: others hide the mark"
         for k in sorted(component.poses):
             share = _violated_share(k, component, judge)
             if share > config.max_violated_share:

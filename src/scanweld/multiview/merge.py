@@ -7,6 +7,7 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
+from scanweld.pairs.marks import Told, is_refuted_jointly
 from scanweld.pairs.result import (
     VIOLATION_WEIGHT,
     Evidence,
@@ -20,10 +21,15 @@ Judge = Callable[[int, int, Pose], Evidence]
 Poses = Mapping[int, Pose]
 """component_from_sensor of a component's scans."""
 
+Tell = Callable[[Poses, Poses], Sequence[Told]]
+"""What the sensors of two components in one frame say of the pixels of each other's scans."""
+
 MIN_CANDIDATE_SCORE = -0.25
 """Alternatives scored below this propose nothing."""
 MAX_JUDGED = 12
 """Distinct ways to merge two components that are judged, those with most support first."""
+TIED_SHARE = 0.4
+"""Merges within this share of the best one's score are told apart by all pixels, if they can be."""
 FREE_SHARE = 0.1
 """Weight of free space when many pairs speak: real silhouettes have gaps, surfaces do not."""
 
@@ -38,7 +44,7 @@ class Support:
         rank: Of the alternative in the pair's result, 0 for the best.
         score: Its score.
         agree: Share of the samples that agree in it.
-        is_good: Whether it is the best of a good pair.
+        is_good: Whether it is the best of a good pair, or of one that a mark decides.
         is_given: Whether it comes from start poses alone.
     """
 
@@ -97,8 +103,11 @@ def propose_merges(
     centres: Sequence[FloatArray],
     near: tuple[float, float],
     judge: Judge,
+    tell: Tell | None = None,
 ) -> list[Merge]:
     """Distinct ways to merge two components, best first, each with its margin over its rivals.
+
+    Those that another one refutes are left out.
 
     Args:
         a: First component.
@@ -107,16 +116,34 @@ def propose_merges(
         centres: (3,) middle of each scan's samples, sensor frame.
         near: Angle in degrees and shift within which two proposals are the same.
         judge: Gives the evidence on any pair at any pose.
+        tell: Gives what all pixels say, where merges are tied.
     """
     proposals = _proposals(a, b, pairs)
     middle = np.mean([b[j].apply(centres[j]) for j in sorted(b)], axis=0)
     clusters = _cluster(proposals, middle, near)[:MAX_JUDGED]
     merges = [_judged(a, b, motion, supports, judge) for motion, supports in clusters]
     merges.sort(key=lambda merge: -merge.score)
+    if tell is not None:
+        merges = _unrefuted(a, b, merges, tell)
     return [
         replace(merge, margin=margin_over(merge.score, [m.score for m in merges if m is not merge]))
         for merge in merges
     ]
+
+
+def _unrefuted(a: Poses, b: Poses, merges: Sequence[Merge], tell: Tell) -> list[Merge]:
+    """Merges, best first, without those tied with the best that another one of these refutes."""
+    least = (1.0 - TIED_SHARE) * merges[0].score if merges else 0.0
+    tied = [merge for merge in merges if merge.score > 0 and merge.score >= least]
+    if len(tied) < 2:
+        return list(merges)
+    told = [tell(a, {j: merge.a_from_b @ pose for j, pose in b.items()}) for merge in tied]
+    refuted = [
+        merge
+        for merge, own in zip(tied, told, strict=True)
+        if any(other is not own and is_refuted_jointly(own, other) for other in told)
+    ]
+    return [merge for merge in merges if not any(merge is one for one in refuted)]
 
 
 def without(merges: Sequence[Merge], banned: Collection[tuple[int, int, int]]) -> list[Merge]:
@@ -143,14 +170,14 @@ def _proposals(
                 if option.score < MIN_CANDIDATE_SCORE:
                     continue
                 i_from_j = option.i_from_j if i < j else option.i_from_j.inverse()
-                is_good = rank == 0 and result is not None and result.kind is PairKind.GOOD
+                is_sure = result is not None and (result.kind is PairKind.GOOD or result.is_marked)
                 support = Support(
                     i=i,
                     j=j,
                     rank=rank,
                     score=option.score,
                     agree=option.evidence.agree,
-                    is_good=is_good,
+                    is_good=rank == 0 and is_sure,
                     is_given=option.is_given,
                 )
                 found.append((a[i] @ i_from_j @ b[j].inverse(), support))

@@ -13,6 +13,7 @@ from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
 from scanweld.pairs.icp import IcpSchedule, icp
 from scanweld.pairs.information import information_of
+from scanweld.pairs.marks import Decided, decide
 from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult, near_best, weights_of
 from scanweld.pairs.symmetry import symmetry_of
 from scanweld.pairs.verdict import classify_pair
@@ -32,6 +33,8 @@ NUM_COARSE_SAMPLES = 200
 """Samples of a scan that take part while many poses are looked at roughly,"""
 NUM_FINE_SAMPLES = 400
 """and while those that are left are looked at closely."""
+NUM_RIVALS = 24
+"""Distinct poses among which symmetries are looked for, at most."""
 RANKING_WEIGHTS = search_weights(VIOLATION_WEIGHT)
 ALIKE_SHARE = 0.5
 """Rivals within this share of the margin that makes a pose sure show symmetries; those beaten more
@@ -81,8 +84,12 @@ def register_pair(
     poses = _refined(field_i, field_j, poses, far, diameter, middle)
     poses = _distinct(poses, field_j, diameter, config.num_survivors[1])
     poses = _refined(field_i, field_j, poses, near, diameter, fine)
-    poses = _distinct(poses, field_j, diameter, config.num_alternatives, rivals=True)
-    alternatives = _ranked([alternative_at(field_i, field_j, to_pose(row), fine) for row in poses])
+    poses = _distinct(poses, field_j, diameter, NUM_RIVALS, rivals=True)
+    found = [alternative_at(field_i, field_j, to_pose(row), fine) for row in poses]
+    alternatives = _ranked(found[: config.num_alternatives])
+    decided = _by_marks(field_i, field_j, _ranked(found), near, fine, diameter, config)
+    if decided is not None:
+        alternatives = _as_decided(alternatives, decided, field_j, diameter)
     if polish is not None:
         alternatives = _ranked(_polished(field_i, field_j, alternatives, polish, fine))
         # Two that were distinct may have come to the same: an answer is no rival of itself.
@@ -92,7 +99,49 @@ def register_pair(
     if start is not None:
         given = _from_start(field_i, field_j, start, diameter, fine, polish)
         alternatives = _with_given(alternatives, given, field_j, diameter)
-    return result_of(i, j, field_i, field_j, tuple(alternatives), diameter, config)
+    return result_of(
+        i,
+        j,
+        field_i,
+        field_j,
+        tuple(alternatives),
+        diameter,
+        config,
+        is_marked=decided is not None and decided.is_hidden_in_others,
+    )
+
+
+def _by_marks(
+    i: ScanField,
+    j: ScanField,
+    alternatives: Sequence[Alternative],
+    schedule: IcpSchedule,
+    tolerance: float,
+    diameter: float,
+    config: PairsConfig,
+) -> Decided | None:
+    """What marks decide among poses that tie."""
+
+    def refine(poses: Sequence[Pose]) -> list[Alternative]:
+        rows = icp(i, j, pose_rows(list(poses)), schedule, diameter)
+        return [alternative_at(i, j, to_pose(row), tolerance) for row in rows]
+
+    near = np.radians(RIVAL_ANGLE_DEG), RIVAL_SHIFT_DIAMETERS * diameter
+    return decide(i, j, alternatives, refine, near, tolerance, diameter, config.min_margin)
+
+
+def _as_decided(
+    alternatives: Sequence[Alternative], decided: Decided, j: ScanField, diameter: float
+) -> list[Alternative]:
+    """The pose that a mark decides on first, then what never tied with it."""
+    others = [
+        option
+        for option in alternatives
+        if not any(
+            is_same(option, one, j, diameter) for one in (decided.pose, *decided.passed_over)
+        )
+    ]
+    return [decided.pose, *others]
 
 
 def _schedules(diameter: float) -> tuple[IcpSchedule, IcpSchedule]:
@@ -229,8 +278,14 @@ def result_of(
     alternatives: tuple[Alternative, ...],
     diameter: float,
     config: PairsConfig,
+    *,
+    is_marked: bool = False,
 ) -> PairResult:
-    """The result of a pair from its distinct poses, the one to be judged first."""
+    """The result of a pair from its distinct poses, the one to be judged first.
+
+    If only a mark decides for it, turns that hide the mark being left, then the pair stays
+    ambiguous, and no turn is free.
+    """
     information, rms = np.zeros((6, 6)), float("nan")
     rivals = near_best(alternatives, ALIKE_SHARE * config.min_margin)
     weights = weights_of(rivals, config.min_margin, config.min_score)
@@ -240,7 +295,9 @@ def result_of(
         radius = config.tolerance_diameters[2] * diameter
         pose = alternatives[0].i_from_j
         information, rms, _ = information_of(field_i, field_j, pose, radius, diameter)
-    return classify_pair(i, j, alternatives, information, rms, symmetry, config)
+    return classify_pair(
+        i, j, alternatives, information, rms, symmetry, config, is_marked=is_marked
+    )
 
 
 def alternative_at(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> Alternative:

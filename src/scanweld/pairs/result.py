@@ -201,6 +201,8 @@ class PairResult:
         rms: Point-to-plane residual of the best pose's matches, in the scans' unit; NaN if none.
         sliding: Which motion is free, where the pair is a sliding one.
         symmetry: What the equally good poses of an ambiguous pair have in common.
+        is_marked: Whether the best pose of an ambiguous pair is the one that explains a small mark,
+            all others that tie being left out: they contradict it or hide it.
     """
 
     i: int
@@ -214,6 +216,7 @@ class PairResult:
     rms: float
     sliding: Slippage | None = None
     symmetry: Symmetry | None = None
+    is_marked: bool = False
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

@@ -6,7 +6,7 @@ from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.information import observability_of
 from scanweld.pairs.result import MIN_AGREE, Alternative, PairKind, PairResult, margin_among
-from scanweld.pairs.slippage import Slippage, slide_words, slippage_of
+from scanweld.pairs.slippage import Slide, Slippage, slide_words, slippage_of
 from scanweld.pairs.symmetry import Symmetry
 
 
@@ -18,6 +18,8 @@ def classify_pair(
     rms: float,
     symmetry: Symmetry | None,
     config: PairsConfig,
+    *,
+    is_marked: bool = False,
 ) -> PairResult:
     """Give a pair its kind: what its evidence, margin and observability allow to say.
 
@@ -29,10 +31,16 @@ def classify_pair(
         rms: Residual of the best pose, in the scans' unit; NaN if there is none.
         symmetry: What the best pose and its rivals have in common; None without a rival.
         config: Settings.
+        is_marked: Whether a mark alone decides, which some turns hide.
     """
     margin = margin_among(alternatives[0], alternatives) if alternatives else 0.0
     sliding = slippage_of(information, config.min_observability)
+    if is_marked and sliding is not None and sliding.slide is Slide.REVOLUTION:
+        sliding = None
     kind, reason = _kind(alternatives, sliding, margin, symmetry, config)
+    is_marked = is_marked and kind is PairKind.GOOD
+    if is_marked:
+        kind, reason = PairKind.AMBIGUOUS, "only a small mark decides: other poses hide it"
     return PairResult(
         i=i,
         j=j,
@@ -45,6 +53,7 @@ def classify_pair(
         rms=rms,
         sliding=sliding if kind is PairKind.SLIDING else None,
         symmetry=symmetry if kind is PairKind.AMBIGUOUS else None,
+        is_marked=is_marked,
     )
 
 

@@ -1,0 +1,198 @@
+"""Marks: one small place that decides between the turns of an object that is nearly symmetric."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scanweld.config import GraphConfig
+from scanweld.evaluation.primitives import lathe
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose, rotation_exp
+from scanweld.multiview.explain import find_doubts
+from scanweld.multiview.merge import Poses, propose_merges
+from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.pairs.marks import Decided, Told, decide, is_refuted_jointly, see, told_of
+from scanweld.pairs.register import alternative_at
+from scanweld.pairs.result import Alternative, PairKind, PairResult
+from tests.prepared import PreparedPair, prepared_pair
+from tests.scenes import scene_of
+from tests.test_view_graph import exact_pair, pair_of, seen, world_of
+
+Radius = Callable[[FloatArray, FloatArray], FloatArray]
+TOLERANCE = 0.012
+NEAR_DEG, NEAR_SHIFT = 12.0, 0.06
+
+
+def gear(turn: FloatArray, level: FloatArray) -> FloatArray:
+    return 44.0 + 6.0 * np.tanh(4.0 * np.cos(8 * turn)) + 0.0 * level
+
+
+def worn(turn: FloatArray, level: FloatArray) -> FloatArray:
+    is_worn = np.abs(np.angle(np.exp(1j * (turn - np.pi / 4)))) < np.pi / 10
+    return gear(turn, level) - np.where(is_worn & (level > 0.5), 6.0, 0.0)
+
+
+def vase(turn: FloatArray, level: FloatArray) -> FloatArray:
+    return 24.0 + 10.0 * np.sin(2.5 * np.pi * level + 0.3) - 4.0 * level + 0.0 * turn
+
+
+def knobbed(turn: FloatArray, level: FloatArray) -> FloatArray:
+    away2 = (30.0 * (turn - 0.5)) ** 2 + (100.0 * (level - 0.3)) ** 2
+    return vase(turn, level) + 4.0 * np.exp(-away2 / 17.0)
+
+
+def unequal(turn: FloatArray, level: FloatArray) -> FloatArray:
+    """Every other tooth is lower."""
+    return gear(turn, level) - np.where(np.cos(8 * turn) > 0, 4.0 * (np.cos(4 * turn) < 0), 0.0)
+
+
+def scanned(radius: Radius, height: float, elevation_deg: float, noise: float) -> PreparedPair:
+    """Two scans 50 deg apart."""
+    mesh = lathe(radius, height)
+    views = [view_of(mesh, turn, elevation_deg, 20.0, pixels=200.0) for turn in (0.0, 50.0)]
+    scene = scene_of(mesh, views, noise=NoiseModel(depth_diameters=noise, dropout=0.01))
+    return prepared_pair(scene.scans[0], scene.scans[1], scene.i_from_j(0, 1))
+
+
+def turned(pair: PreparedPair, degrees: Sequence[float]) -> list[Alternative]:
+    """The true pose with j's object turned about the object's axis, best evidence first."""
+    axis, point = axis_of(pair)
+    options = []
+    for angle in degrees:
+        turn = rotation_exp(np.radians(angle) * axis)
+        pose = pair.i_from_j @ Pose(rotation=turn, translation=point - turn @ point)
+        options.append(alternative_at(*pair.fields, pose, TOLERANCE * pair.diameter))
+    return sorted(options, key=lambda option: -option.score)
+
+
+def axis_of(pair: PreparedPair) -> tuple[FloatArray, FloatArray]:
+    """Direction and a point of the axis in the sensor frame of j, from both sensors' places.
+
+    The sensors look at the middle of the object from the same elevation, so that their turn about
+    its axis takes one to the other.
+    """
+    motion = pair.i_from_j
+    angles, vectors = np.linalg.eig(motion.rotation)
+    axis = np.real(vectors[:, int(np.argmin(np.abs(angles - 1.0)))])
+    rows = np.eye(3) - motion.rotation
+    point = np.linalg.lstsq(rows, motion.translation, rcond=1e-6)[0]
+    return axis.astype(np.float64), point.astype(np.float64)
+
+
+def decided(pair: PreparedPair, options: Sequence[Alternative]) -> Decided | None:
+    def refine(poses: Sequence[Pose]) -> list[Alternative]:
+        return [alternative_at(*pair.fields, pose, TOLERANCE * pair.diameter) for pose in poses]
+
+    near = np.radians(NEAR_DEG), NEAR_SHIFT * pair.diameter
+    size = TOLERANCE * pair.diameter, pair.diameter
+    return decide(*pair.fields, options, refine, near, *size, 0.4)
+
+
+EIGHT = [45.0 * k for k in range(8)]
+
+
+@pytest.mark.parametrize("noise", [0.0005, 0.003])
+def test_a_worn_tooth_decides_between_the_turns_of_a_gear(noise: float):
+    pair = scanned(worn, 30.0, 35.0, noise)
+    found = decided(pair, turned(pair, EIGHT))
+    assert found is not None
+    angle, shift = pair.off_by(found.pose.i_from_j)
+    assert angle < 1.0 and shift < 0.01
+    assert len(found.passed_over) == 7
+
+
+def test_turns_that_the_search_missed_are_found():
+    pair = scanned(worn, 30.0, 35.0, 0.0005)
+    wrong = turned(pair, [45.0, 90.0, 180.0, 270.0])
+    found = decided(pair, wrong)
+    assert found is not None and pair.off_by(found.pose.i_from_j)[0] < 1.0
+
+
+@pytest.mark.parametrize("noise", [0.0005, 0.005])
+def test_nothing_decides_between_the_turns_of_a_whole_gear(noise: float):
+    pair = scanned(gear, 30.0, 35.0, noise)
+    assert decided(pair, turned(pair, EIGHT)) is None
+
+
+def test_a_difference_all_over_is_no_mark():
+    pair = scanned(unequal, 30.0, 35.0, 0.0005)
+    found = decided(pair, turned(pair, EIGHT))
+    assert found is None
+
+
+def test_a_knob_decides_and_says_that_some_turns_hide_it():
+    pair = scanned(knobbed, 100.0, 15.0, 0.0005)
+    found = decided(pair, turned(pair, [20.0 * k for k in range(18)]))
+    assert found is not None and found.is_hidden_in_others
+    assert pair.off_by(found.pose.i_from_j)[0] < 1.0
+    plain = scanned(vase, 100.0, 15.0, 0.0005)
+    assert decided(plain, turned(plain, [20.0 * k for k in range(18)])) is None
+
+
+def test_one_rival_shows_no_symmetry():
+    pair = scanned(worn, 30.0, 35.0, 0.0005)
+    assert decided(pair, turned(pair, [0.0, 180.0])) is None
+    assert decided(pair, turned(pair, [0.0])) is None
+    assert decided(pair, []) is None
+
+
+def test_a_pose_refutes_another_and_not_itself():
+    pair = scanned(worn, 30.0, 35.0, 0.0005)
+    right, wrong = (turned(pair, [angle])[0].i_from_j for angle in (0.0, 45.0))
+    tolerance = TOLERANCE * pair.diameter
+    here, there = (
+        [told_of([one], tolerance) for one in see(*pair.fields, pose, pair.diameter)]
+        for pose in (right, wrong)
+    )
+    assert is_refuted_jointly(there, here)
+    assert not is_refuted_jointly(here, there)
+    assert not is_refuted_jointly(here, here)
+
+
+def test_merges_that_another_one_refutes_are_no_rivals():
+    world = world_of(2)
+    right = world[0].inverse() @ world[1]
+    spin = Pose(rotation=rotation_exp(np.array([0.0, 0.0, 1.0])), translation=np.zeros(3))
+    both = [Alternative(i_from_j=pose, evidence=seen(0.5)) for pose in (right, right @ spin)]
+    pairs = {(0, 1): pair_of(0, 1, PairKind.AMBIGUOUS, *both)}
+    a, b = {0: Pose.identity()}, {1: Pose.identity()}
+    fixed = a, b, pairs, [np.zeros(3)] * 2, (5.0, 0.03), lambda i, j, pose: seen(0.5)
+    tied = propose_merges(*fixed)
+    assert [merge.margin for merge in tied] == pytest.approx([0.0, 0.0])
+
+    pair = scanned(worn, 30.0, 35.0, 0.0005)
+    poses = {
+        is_right: turned(pair, [0.0 if is_right else 45.0])[0].i_from_j
+        for is_right in (True, False)
+    }
+
+    def tell(_: Poses, moved: Poses) -> list[Told]:
+        is_right = (right.inverse() @ moved[1]).angle_deg() < 1.0
+        both = see(*pair.fields, poses[is_right], pair.diameter)
+        return [told_of([seen_], TOLERANCE * pair.diameter) for seen_ in both]
+
+    (kept,) = propose_merges(*fixed, tell)
+    assert (kept.a_from_b.inverse() @ right).angle_deg() < 1e-6 and kept.margin == 1.0
+
+
+def test_what_only_a_mark_holds_is_doubtful():
+    world = world_of(4)
+    pairs = {e: exact_pair(*e, world) for e in ((0, 1), (1, 2), (2, 3))}
+    marked = replace(pairs[2, 3], kind=PairKind.AMBIGUOUS, is_marked=True)
+    component = Component(poses=dict(enumerate(world)), reference=0)
+
+    def doubts(last: PairResult) -> dict[int, str]:
+        both = {**pairs, (2, 3): last}
+        accepted = {edge: result.alternatives[0] for edge, result in both.items()}
+        graph = ViewGraph(
+            pairs=both, accepted=accepted, rejected={}, components=(component,), unplaced={}
+        )
+        return find_doubts(graph, lambda i, j, pose: seen(0.5), GraphConfig())
+
+    assert doubts(pairs[2, 3]) == {}
+    assert list(doubts(marked)) == [3]
+    assert "mark" in doubts(marked)[3]
