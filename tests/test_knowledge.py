@@ -423,6 +423,6 @@ def test_files_that_are_no_facts_are_named(tmp_path: Path, text: str, told: str)
 
 
 def test_a_file_of_facts_that_is_not_there_is_named(tmp_path: Path):
-    with pytest.raises(KnowledgeError, match="facts.json: No such file") as raised:
+    with pytest.raises(KnowledgeError, match=r"facts\.json: No such file") as raised:
         read_knowledge(tmp_path / "facts.json")
     assert "correct it" not in str(raised.value)

@@ -15,7 +15,8 @@ from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Poses, propose_merges
 from scanweld.multiview.view_graph import Component, ViewGraph
-from scanweld.pairs.marks import Decided, Told, decide, is_refuted_jointly, see, told_of
+from scanweld.pairs.marks import Decided, decide, is_refuted_jointly
+from scanweld.pairs.pixels import Told, see, told_of
 from scanweld.pairs.register import alternative_at
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 from tests.prepared import PreparedPair, prepared_pair

@@ -24,7 +24,7 @@ from scanweld.multiview.scale import estimate_scales
 from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
-from scanweld.pairs.marks import Told, see, told_of
+from scanweld.pairs.pixels import Told, see, told_of
 from scanweld.pairs.result import Evidence, PairResult
 from scanweld.pairs.visibility import judge, mean_evidence
 from scanweld.reconstruction import FactReport

@@ -84,7 +84,7 @@ def joint_evidence(graph: ViewGraph, component: Component, witnesses: Witnesses)
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class _Standing:
-    """How the place of a scan compares with others: its margin, and how clearly they are refuted."""
+    """A place beside others: its margin over them, and how clearly they are refuted."""
 
     margin: float
     refutation: float

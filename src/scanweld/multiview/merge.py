@@ -132,9 +132,16 @@ def propose_merges(
 
 
 def _unrefuted(a: Poses, b: Poses, merges: Sequence[Merge], tell: Tell) -> list[Merge]:
-    """Merges, best first, without those tied with the best that another one of these refutes."""
+    """Merges, best first, without those tied with the best that another one of these refutes.
+
+    One that a sure pair proposes is tied however little the components meet in it.
+    """
     least = (1.0 - TIED_SHARE) * merges[0].score if merges else 0.0
-    tied = [merge for merge in merges if merge.score > 0 and merge.score >= least]
+    tied = [
+        merge
+        for merge in merges
+        if merge.score > 0 and (merge.score >= least or any(s.is_good for s in merge.supports))
+    ]
     if len(tied) < 2:
         return list(merges)
     told = [tell(a, {j: merge.a_from_b @ pose for j, pose in b.items()}) for merge in tied]

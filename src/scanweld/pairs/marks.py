@@ -15,82 +15,35 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.prepared import PixelKind
 from scanweld.pairs.distinct import distinct_poses
-from scanweld.pairs.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
+from scanweld.pairs.field import RASTER_DEPTH, ScanField
+from scanweld.pairs.pixels import Seen, Told, TwoWay, agrees, coherent, see, told_of
 from scanweld.pairs.result import CLEAN_SHARE, Alternative, rival_score
 from scanweld.pairs.visibility import pose_rows
 
-JUMP_PIXELS = 6.0
-"""Depths of four neighbouring pixels that differ by more, in footprints, make no surface."""
-AGREE_TOLERANCES = 0.5
-"""Farthest that a pixel lies from the other scan's surface where it agrees with it."""
-MIN_PATCH_PIXELS = 8
-"""Pixels that hang together and all say the same, at least, to be told from chance."""
 MIN_MARK_PIXELS = 10
 """Pixels in such patches that refute a pose, or make a mark, at least."""
 MAX_REVERSE = 0.1
 """Share of them that may speak against the other pose; share of a mark that a rival may show."""
-MAJORITY = 0.6
-"""Share of the 3 x 3 pixels around one that must say the same: strips along edges are too thin."""
 MIN_SAYING = 0.25
 """Share of the refuted poses that a mark's place refutes."""
 MARK_DIAMETERS = 0.15
 """Most of a mark lies within this of its middle."""
 MOST = 0.9
 """How much that is."""
-MAX_MARK_AREA = 0.02
-"""Of a mark and what it comes to lie on, in squared diameters."""
 MIN_REFUTED = 3
 """Poses that tie but for the mark, at least: fewer do not show that an object is near-symmetric."""
 MAX_TURNS = 60
 """Distinct poses of a pair that are looked at; of more, there is a continuum."""
 NUM_ROUNDS = 3
 
-IS_SURFACE = float(PixelKind.SURFACE)
 
 Refine = Callable[[Sequence[Pose]], list[Alternative]]
 """Refines poses i_from_j of the pair at hand, and gives them their evidence."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Seen:
-    """All pixels of a scan in what another one saw, at a pose.
-
-    Attributes:
-        behind: (H, W) distance behind the other scan's surface; NaN without a say.
-        lands: (H, W) index of the pixel that they fall on; -1 without a say.
-        max_pixels: So many may a mark and what it comes to lie on have in this scan.
-    """
-
-    behind: NDArray[np.float32]
-    lands: NDArray[np.int32]
-    max_pixels: float
-
-
-TwoWay = tuple[Seen, Seen]
-"""Of the pixels of i in what j saw, and of those of j in what i saw."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Told:
-    """What the sensors of several scans say of all pixels of another one.
-
-    Attributes:
-        agrees: (H, W) pixels that lie on the surface that any of them saw, and before none.
-        violates: (H, W) pixels of patches that lie before the surface that any of them saw.
-        max_pixels: So many may a mark and what it comes to lie on have.
-    """
-
-    agrees: BoolArray
-    violates: BoolArray
-    max_pixels: float
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -163,9 +116,9 @@ def decide(
 
 
 def _is_worse(rival: TwoWay, pose: Sequence[Told], tolerance: float) -> bool:
-    """Whether patches of any size speak against a rival and none for it."""
+    """Whether patches of any size, wherever they are, contradict a rival and none the pose."""
     told = [told_of([one], tolerance) for one in rival]
-    against = sum(_counts_against(told, pose))
+    against = sum(int(np.count_nonzero(one.violates)) for one in told)
     return against >= MIN_MARK_PIXELS and _reverse(told, pose) <= MAX_REVERSE * against
 
 
@@ -184,7 +137,7 @@ def _is_mark(
     most = MAX_REVERSE * sum(int(mark.sum()) for mark in marks)
     return all(
         sum(
-            int((_agrees(one.behind, tolerance) & mark).sum())
+            int((agrees(one.behind, tolerance) & mark).sum())
             for one, mark in zip(both, marks, strict=True)
         )
         <= most
@@ -234,10 +187,6 @@ def _all_turns(
     return turns
 
 
-def _agrees(behind: NDArray[np.float32], tolerance: float) -> BoolArray:
-    return np.abs(behind) < AGREE_TOLERANCES * tolerance
-
-
 def _marks_of(
     seen: Sequence[TwoWay],
     told: Sequence[Sequence[Told]],
@@ -261,10 +210,19 @@ def _marks_of(
             vote += ndimage.binary_dilation(place)
     least = max(2.0, MIN_SAYING * len(refuted))
     one, other = (
-        _coherent((vote >= least) & _agrees(own.behind, tolerance))
+        coherent((vote >= least) & agrees(own.behind, tolerance))
         for vote, own in zip(votes, seen[a], strict=True)
     )
-    return one, other
+    # What a mark agrees with is the same mark, if seen too aslant to be contradicted elsewhere.
+    on_one, on_other = _hit(other, seen[a][1], one.shape), _hit(one, seen[a][0], other.shape)
+    return one | on_one, other | on_other
+
+
+def _hit(mark: BoolArray, own: Seen, shape: tuple[int, ...]) -> BoolArray:
+    """Pixels (H, W) of the other scan that a mark's pixels fall on."""
+    hit = np.zeros(shape, dtype=bool)
+    hit.ravel()[own.lands[mark]] = True
+    return hit
 
 
 def _is_small(scan: ScanField, mark: BoolArray, diameter: float) -> bool:
@@ -280,32 +238,6 @@ def _is_small(scan: ScanField, mark: BoolArray, diameter: float) -> bool:
     points = np.stack([x, y, depth], axis=1)
     away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     return float(np.quantile(away, MOST)) < MARK_DIAMETERS * diameter
-
-
-def see(i: ScanField, j: ScanField, i_from_j: Pose, diameter: float) -> TwoWay:
-    """All pixels of both scans in what the other saw."""
-    forward, backward = pose_rows([i_from_j, i_from_j.inverse()])
-    of_i = _seen(i.camera, i.raster, j.camera, j.raster, backward)
-    of_j = _seen(j.camera, j.raster, i.camera, i.raster, forward)
-    return (
-        Seen(behind=of_i[0], lands=of_i[1], max_pixels=_max_pixels(i, diameter)),
-        Seen(behind=of_j[0], lands=of_j[1], max_pixels=_max_pixels(j, diameter)),
-    )
-
-
-def _max_pixels(scan: ScanField, diameter: float) -> float:
-    """How many of a scan's pixels the largest mark and what it lies on may have."""
-    footprint = (scan.centre[2] if scan.camera[0] == 0.0 else 1.0) / scan.camera[1]
-    return float(MAX_MARK_AREA * (diameter / footprint) ** 2)
-
-
-def told_of(seen: Sequence[Seen], tolerance: float) -> Told:
-    """Sum up what several sensors say of the pixels of one scan."""
-    violates = np.any([one.behind < -tolerance for one in seen], axis=0)
-    agrees = np.any([_agrees(one.behind, tolerance) for one in seen], axis=0)
-    return Told(
-        agrees=agrees & ~violates, violates=_coherent(violates), max_pixels=seen[0].max_pixels
-    )
 
 
 def pixels_against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
@@ -335,83 +267,3 @@ def _reverse(rival: Sequence[Told], pose: Sequence[Told]) -> int:
     return sum(
         int(np.count_nonzero(a.violates & ~b.violates)) for b, a in zip(rival, pose, strict=True)
     )
-
-
-def _coherent(said: BoolArray) -> BoolArray:
-    """Those pixels of a mask that hang together in sufficient numbers."""
-    if np.count_nonzero(said) < MIN_PATCH_PIXELS:
-        return np.zeros_like(said)
-    most = ndimage.uniform_filter(said.astype(np.float32), 3, mode="constant") > MAJORITY
-    labels = np.zeros(said.shape, dtype=np.int32)
-    ndimage.label(most & said, output=labels)
-    is_large = np.bincount(labels.ravel()) >= MIN_PATCH_PIXELS
-    is_large[0] = False
-    return is_large[labels]
-
-
-@njit(cache=True, nogil=True)
-def _seen(
-    camera_from: FloatArray,
-    raster_from: NDArray[np.float32],
-    camera_to: FloatArray,
-    raster_to: NDArray[np.float32],
-    pose: FloatArray,
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """How far behind (H, W) one scan's pixels lie in another's raster, and where they fall on it.
-
-    The pose row is to_from.
-    """
-    height, width = raster_from.shape[0], raster_from.shape[1]
-    rows, columns = raster_to.shape[0], raster_to.shape[1]
-    behind = np.full((height, width), np.nan, dtype=np.float32)
-    lands = np.full((height, width), -1, dtype=np.int32)
-    for r in range(height):
-        for c in range(width):
-            if raster_from[r, c, RASTER_KIND] != IS_SURFACE:
-                continue
-            depth = float(raster_from[r, c, RASTER_DEPTH])
-            a, b = (c - camera_from[3]) / camera_from[1], (r - camera_from[4]) / camera_from[2]
-            if camera_from[0] == 0.0:
-                a *= depth
-                b *= depth
-            x = pose[0] * a + pose[1] * b + pose[2] * depth + pose[9]
-            y = pose[3] * a + pose[4] * b + pose[5] * depth + pose[10]
-            z = pose[6] * a + pose[7] * b + pose[8] * depth + pose[11]
-            u, v = camera_to[1] * x, camera_to[2] * y
-            if camera_to[0] == 0.0:
-                if z <= 0.0:
-                    continue
-                u /= z
-                v /= z
-            u += camera_to[3]
-            v += camera_to[4]
-            if not (0.0 <= u < columns - 1.0 and 0.0 <= v < rows - 1.0):
-                continue
-            q, p = int(u), int(v)
-            low, high, seen = np.inf, -np.inf, 0.0
-            is_surface = True
-            for dp in range(2):
-                for dq in range(2):
-                    if raster_to[p + dp, q + dq, RASTER_KIND] != IS_SURFACE:
-                        is_surface = False
-                    at = float(raster_to[p + dp, q + dq, RASTER_DEPTH])
-                    low, high = min(low, at), max(high, at)
-                    across = u - q if dq == 1 else 1.0 - (u - q)
-                    along = v - p if dp == 1 else 1.0 - (v - p)
-                    seen += across * along * at
-            footprint = 1.0 / camera_to[1]
-            if camera_to[0] == 0.0:
-                footprint *= low
-            if not is_surface or high - low > JUMP_PIXELS * footprint:
-                continue
-            near_p, near_q = int(v + 0.5), int(u + 0.5)
-            n = RASTER_NORMAL
-            nx = float(raster_to[near_p, near_q, n])
-            ny = float(raster_to[near_p, near_q, n + 1])
-            nz = float(raster_to[near_p, near_q, n + 2])
-            # A step along the ray, as a distance from the surface.
-            is_pinhole = camera_to[0] == 0.0
-            tilt = abs(nx * x + ny * y + nz * z) / z if is_pinhole else abs(nz)
-            behind[r, c] = (z - seen) * min(tilt, 1.0)
-            lands[r, c] = near_p * columns + near_q
-    return behind, lands

@@ -16,6 +16,7 @@ from scanweld.pairs.information import information_of
 from scanweld.pairs.marks import Decided, decide
 from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult, near_best, weights_of
 from scanweld.pairs.symmetry import symmetry_of
+from scanweld.pairs.turning import turn_to_mark
 from scanweld.pairs.verdict import classify_pair
 from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
 
@@ -127,6 +128,10 @@ def _by_marks(
         return [alternative_at(i, j, to_pose(row), tolerance) for row in rows]
 
     near = np.radians(RIVAL_ANGLE_DEG), RIVAL_SHIFT_DIAMETERS * diameter
+    free = config.min_observability
+    turned = turn_to_mark(i, j, alternatives[0].i_from_j, tolerance, diameter, free)
+    if turned is not None:
+        alternatives = [alternative_at(i, j, turned, tolerance), *alternatives]
     return decide(i, j, alternatives, refine, near, tolerance, diameter, config.min_margin)
 
 
