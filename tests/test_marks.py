@@ -19,6 +19,7 @@ from scanweld.pairs.marks import Decided, decide, is_refuted_jointly
 from scanweld.pairs.pixels import Told, see, told_of
 from scanweld.pairs.register import alternative_at
 from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.turning import STEP_DEG, turn_to_mark
 from tests.prepared import PreparedPair, prepared_pair
 from tests.scenes import scene_of
 from tests.test_view_graph import exact_pair, pair_of, seen, world_of
@@ -132,6 +133,25 @@ def test_a_knob_decides_and_says_that_some_turns_hide_it():
     assert pair.off_by(found.pose.i_from_j)[0] < 1.0
     plain = scanned(vase, 100.0, 15.0, 0.0005)
     assert decided(plain, turned(plain, [20.0 * k for k in range(18)])) is None
+
+
+@pytest.mark.parametrize("start_deg", [-40.0, -25.0, 50.0, 100.0])
+def test_a_vase_is_turned_until_its_knobs_meet(start_deg: float):
+    pair = scanned(knobbed, 100.0, 15.0, 0.001)
+    tolerance = TOLERANCE * pair.diameter
+    start = turned(pair, [start_deg])[0].i_from_j
+    found = turn_to_mark(*pair.fields, start, tolerance, pair.diameter, 2.5e-4)
+    assert found is not None
+    angle, shift = pair.off_by(found)
+    assert angle < STEP_DEG and shift < 0.01
+
+
+@pytest.mark.parametrize(("body", "height"), [(vase, 100.0), (gear, 30.0), (worn, 30.0)])
+def test_without_a_mark_or_a_free_turn_nothing_is_turned(body: Radius, height: float):
+    pair = scanned(body, height, 20.0, 0.001)
+    start = turned(pair, [45.0])[0].i_from_j
+    tolerance = TOLERANCE * pair.diameter
+    assert turn_to_mark(*pair.fields, start, tolerance, pair.diameter, 2.5e-4) is None
 
 
 def test_one_rival_shows_no_symmetry():

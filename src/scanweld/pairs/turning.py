@@ -22,8 +22,6 @@ MIN_CONTESTED = 0.25
 """Share of the turns with contradictions in which a mark's pixels are contradicted."""
 MIN_PIXELS = 10
 """Pixels of a mark in each scan, at least."""
-FINE_TOLERANCES = 0.5
-"""Tolerance of the last steps, in those of the others: a mark's slopes tell fractions of a turn."""
 
 
 def turn_to_mark(
@@ -64,9 +62,7 @@ def turn_to_mark(
         return None
     best = float(turns[int(np.argmax([_shared(one, marks, tolerance) for one in seen]))])
     near = best + np.arange(-STEP_DEG, STEP_DEG + FINE_STEP_DEG, FINE_STEP_DEG)
-    fine = [_shared(at(turn), marks, FINE_TOLERANCES * tolerance) for turn in near]
-    # Several turns may do as well: their middle is meant.
-    best = float(np.average(near, weights=np.array(fine) >= max(fine)))
+    best = float(near[int(np.argmin([_apart(at(turn), marks, tolerance) for turn in near]))])
     if _shared(at(best), marks, tolerance) < MIN_PIXELS:
         return None
     return _about(*axis, best) @ i_from_j
@@ -122,3 +118,9 @@ def _shared(both: TwoWay, marks: tuple[BoolArray, BoolArray], tolerance: float) 
         on_surface = agrees(both[k].behind, tolerance) & marks[k]
         counts.append(int(marks[1 - k].ravel()[both[k].lands[on_surface]].sum()))
     return min(counts)
+
+
+def _apart(both: TwoWay, marks: tuple[BoolArray, BoolArray], tolerance: float) -> float:
+    """How far the marks lie from the other scan's surface, in tolerances; 1 each at most."""
+    away = [np.abs(one.behind[mark]) / tolerance for one, mark in zip(both, marks, strict=True)]
+    return float(sum(np.nan_to_num(x, nan=1.0).clip(max=1.0).sum() for x in away))
