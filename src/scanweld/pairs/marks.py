@@ -21,7 +21,7 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import RASTER_DEPTH, ScanField
-from scanweld.pairs.pixels import Seen, Told, TwoWay, agrees, coherent, see, told_of
+from scanweld.pairs.pixels import Told, TwoWay, agrees, coherent, fallen_on, see, told_of
 from scanweld.pairs.result import CLEAN_SHARE, Alternative, rival_score
 from scanweld.pairs.visibility import pose_rows
 
@@ -205,7 +205,7 @@ def _marks_of(
         for k in (0, 1):
             against = told[b][k].violates & told[a][k].agrees
             contested[k] |= against
-            contested[1 - k].ravel()[seen[b][k].lands[against]] = True
+            contested[1 - k] |= fallen_on(seen[b][k], against, contested[1 - k].shape)
         for vote, place in zip(votes, contested, strict=True):
             vote += ndimage.binary_dilation(place)
     least = max(2.0, MIN_SAYING * len(refuted))
@@ -214,15 +214,9 @@ def _marks_of(
         for vote, own in zip(votes, seen[a], strict=True)
     )
     # What a mark agrees with is the same mark, if seen too aslant to be contradicted elsewhere.
-    on_one, on_other = _hit(other, seen[a][1], one.shape), _hit(one, seen[a][0], other.shape)
+    on_one = fallen_on(seen[a][1], other, one.shape)
+    on_other = fallen_on(seen[a][0], one, other.shape)
     return one | on_one, other | on_other
-
-
-def _hit(mark: BoolArray, own: Seen, shape: tuple[int, ...]) -> BoolArray:
-    """Pixels (H, W) of the other scan that a mark's pixels fall on."""
-    hit = np.zeros(shape, dtype=bool)
-    hit.ravel()[own.lands[mark]] = True
-    return hit
 
 
 def _is_small(scan: ScanField, mark: BoolArray, diameter: float) -> bool:

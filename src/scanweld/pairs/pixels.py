@@ -93,6 +93,13 @@ def agrees(behind: NDArray[np.float32], tolerance: float) -> BoolArray:
     return np.abs(behind) < AGREE_TOLERANCES * tolerance
 
 
+def fallen_on(seen: Seen, mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
+    """Pixels of the other scan, of that shape, that some pixels of this one fall on."""
+    hit = np.zeros(shape, dtype=bool)
+    hit.ravel()[seen.lands[mask]] = True
+    return hit
+
+
 def coherent(said: BoolArray) -> BoolArray:
     """Those pixels of a mask that hang together in sufficient numbers."""
     if np.count_nonzero(said) < MIN_PATCH_PIXELS:

@@ -13,7 +13,7 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.information import information_from, two_way_matches
-from scanweld.pairs.pixels import TwoWay, agrees, coherent, see, told_of
+from scanweld.pairs.pixels import TwoWay, agrees, coherent, fallen_on, see, told_of
 from scanweld.pairs.slippage import Slide, slippage_of
 
 FIRST_STEP_DEG, STEP_DEG, FINE_STEP_DEG = 15.0, 3.0, 0.5
@@ -97,18 +97,19 @@ def _is_contested(both: TwoWay, tolerance: float) -> bool:
 
 def _marks(seen: Sequence[TwoWay], tolerance: float) -> tuple[BoolArray, BoolArray]:
     """Pixels of both scans that are contradicted, or contradict, in many of the turns."""
-    votes = [np.zeros(one.behind.shape, dtype=np.int64) for one in seen[0]]
-    count = 0
-    for both in seen:
-        violates = [told_of([one], tolerance).violates for one in both]
-        count += any(patch.any() for patch in violates)
-        for k in (0, 1):
-            hit = np.zeros(votes[1 - k].shape, dtype=bool)
-            hit.ravel()[both[k].lands[violates[k]]] = True
-            votes[k] = votes[k] + ndimage.binary_dilation(violates[k])
-            votes[1 - k] = votes[1 - k] + ndimage.binary_dilation(hit)
-    least = max(2.0, MIN_CONTESTED * count)
-    return coherent(votes[0] >= least), coherent(votes[1] >= least)
+    told = [(told_of([of_i], tolerance), told_of([of_j], tolerance)) for of_i, of_j in seen]
+    least = max(2.0, MIN_CONTESTED * sum(any(one.violates.any() for one in both) for both in told))
+    votes_i, votes_j = (np.zeros(one.behind.shape) for one in seen[0])
+    for (of_i, of_j), (says_i, says_j) in zip(seen, told, strict=True):
+        votes_i += _around(says_i.violates)
+        votes_i += _around(fallen_on(of_j, says_j.violates, votes_i.shape))
+        votes_j += _around(says_j.violates)
+        votes_j += _around(fallen_on(of_i, says_i.violates, votes_j.shape))
+    return coherent(votes_i >= least), coherent(votes_j >= least)
+
+
+def _around(patches: BoolArray) -> BoolArray:
+    return np.asarray(ndimage.binary_dilation(patches))
 
 
 def _shared(both: TwoWay, marks: tuple[BoolArray, BoolArray], tolerance: float) -> int:
