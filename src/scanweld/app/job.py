@@ -1,5 +1,6 @@
 """The main job: files to an output folder."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -58,9 +59,17 @@ def run_job(
             cache=workspace.cache,
             progress=progress,
         )
-        write_outputs(result, workspace.staging)
+        write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
         workspace.publish()
     return result
+
+
+def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:
+    """Where each scan's file is, by the scan's name, as seen from a folder."""
+    return {
+        file.name: printable(Path(os.path.relpath(os.path.abspath(file.path), folder)).as_posix())
+        for file in files
+    }
 
 
 def read_all(
