@@ -49,7 +49,7 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
     """
     frames = [_frame(scan) for scan in scans]
     content = {"camera_model": "OPENCV", "frames": frames}
-    return {"transforms.json": json.dumps(content, ensure_ascii=False, indent=1) + "\n"}
+    return {"transforms.json": json.dumps(content, indent=1) + "\n"}
 
 
 def _frame(scan: PosedScan) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
     ]
     names = [scan.name for scan in scans]
     graph = {"class_name": "PoseGraph", "edges": [], "nodes": nodes, _NAMES: names, **_VERSION}
-    return {"posegraph.json": json.dumps(graph, ensure_ascii=False, indent=1) + "\n"}
+    return {"posegraph.json": json.dumps(graph, indent=1) + "\n"}
 
 
 def _pose(path: Path, where: str, node: Any) -> Pose:

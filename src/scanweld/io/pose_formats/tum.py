@@ -39,7 +39,8 @@ def read(path: Path, text: str) -> PoseEntries:
     Raises:
         ReadError: If a line is broken.
     """
-    names = dict(m.groups() for line in text.splitlines() if (m := _NAME.fullmatch(line)))
+    told = [_NAME.fullmatch(line) for line in text.splitlines()]
+    names: dict[str, str] = {match[1]: match[2] for match in told if match}
     entries: list[tuple[str | None, Pose]] = []
     for count, line in _rows(text):
         words = line.split()
