@@ -101,7 +101,9 @@ def require_pinhole(name: str, camera: Camera | None, title: str) -> Camera:
     return camera
 
 
-def refuse_characters(scans: Sequence[PosedScan], texts: Sequence[str], bad: str, title: str):
+def refuse_characters(
+    scans: Sequence[PosedScan], texts: Sequence[str], bad: str, title: str
+) -> None:
     """Refuse names that a format cannot hold, before anything is written.
 
     Args:
