@@ -121,6 +121,22 @@ def check(path: Path, scene: Scene) -> None:
         assert np.abs(poses[scan.name].matrix() - want.matrix()).max() < 1e-9, path
 
 
+def test_colmap_opens_the_model_and_sees_points_where_the_sensors_did(model: Path, scene: Scene):
+    pycolmap = pytest.importorskip("pycolmap")
+    assert scanweld("export", model, "--poses", "colmap", "-o", "out") == 0
+    opened = pycolmap.Reconstruction("out/colmap")
+    images = {image.name: image for image in opened.images.values()}
+    for k, scan in enumerate(scene.scans):
+        image, view = images[f"{scan.name}.png"], scene.views[k]
+        want = view.world_from_sensor.inverse().matrix()[:3]
+        assert np.allclose(image.cam_from_world().matrix(), want, atol=1e-9)
+        seen = view.world_from_sensor.inverse().apply(
+            scene.world_from_scan[scan.name].apply(scan.points[:1])
+        )
+        pixel = opened.cameras[image.camera_id].img_from_cam(seen[0])
+        assert np.allclose(pixel, view.camera.project(seen)[0][0] + 0.5)
+
+
 def test_files_are_named_as_seen_from_the_poses(model: Path):
     assert scanweld("export", model, "--poses", "aln", "-o", "far/away/out") == 0
     lines = Path("far/away/out/poses.aln").read_text().splitlines()
@@ -203,6 +219,10 @@ def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[
         assert scanweld("export", model, "--poses", "mlp", "--poses", form, "-o", "out") == 1
         assert "scan_01: its sensor is orthographic" in error_line(capsys)
     assert snapshot() == before
+    Path("tum.txt").write_text("".join(f"{k} 0 0 0 0 0 0 1\n" for k in range(4)))
+    assert scanweld("fuse", "scans", "--poses", "tum.txt", "-o", "fused", "-q") == 1
+    assert "its sensor is orthographic, and TUM speaks of pinholes only" in error_line(capsys)
+    assert not Path("fused").exists()
 
 
 @pytest.mark.parametrize(
@@ -265,6 +285,16 @@ def test_an_unknown_format_is_wrong_usage_and_told_the_known(
     told = capsys.readouterr().err
     assert repr(option[1]) in told and ("mlp" in told or "glb" in told or "-z" in told)
     assert not Path("out").exists()
+
+
+def test_every_format_and_file_is_documented(model: Path):
+    text = (Path(__file__).parents[1] / "docs/formats.md").read_text(encoding="utf-8")
+    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
+    names = {path.name for path in Path("out").rglob("*.*")}
+    for word in {*FORMATS, "ply", "obj", "stl", "glb"}:
+        assert f"| `{word}` |" in text
+    for name in {name for name in names if not name.startswith("scan_")}:
+        assert name in text, name
 
 
 def test_a_run_tells_where_its_scans_are(model: Path, monkeypatch: pytest.MonkeyPatch):

@@ -189,7 +189,7 @@ def _model(model: ModelFolder, name: str, wanted: Wanted) -> bytes:
 def _glb_notes(model: ModelFolder, wanted: Wanted) -> list[str]:
     if wanted.unit or model.unit:
         return []
-    return ["note: the scans' unit is unknown, so model.glb takes it for metres; --unit says more"]
+    return ["note: the scans' unit is unknown, so model.glb takes it for metres; say it by --unit"]
 
 
 def _points(scans: Mapping[str, RangeScan], poses: Mapping[str, Pose]) -> tuple[bytes, list[str]]:
