@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import scanweld
-from scanweld.evaluation.render import render_shaded, side_by_side, write_png
+from scanweld.geometry.shading import render_shaded, side_by_side, write_png
 from scanweld.geometry.mesh import face_normals
 from scanweld.prepare import prepare
 

@@ -12,7 +12,7 @@ import pytest
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.primitives import plate, sphere
-from scanweld.evaluation.render import render_shaded, side_by_side, write_png
+from scanweld.geometry.shading import render_shaded, side_by_side, write_png
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.paper.drawing.shade import ambient_occlusion
 from benchmarks.paper.drawing.style import INK, PAPER
-from scanweld.evaluation.render import barycentric, looking_from
+from scanweld.geometry.shading import barycentric, looking_from
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import face_normals

@@ -16,7 +16,7 @@ import typer
 
 from scanweld.app.comparison import compare, comparison_table
 from scanweld.app.info import describe_scan
-from scanweld.app.job import run_job
+from scanweld.app.job import report_job, run_job
 from scanweld.app.memory import parse_size
 from scanweld.app.model_commands import export, fuse
 from scanweld.app.named_pairs import named_pairs, with_pairs_joined
@@ -166,6 +166,17 @@ def run(
         raise typer.Exit(INTERRUPTED) from None
     typer.echo(summary(result, output))
     raise typer.Exit(result.verdict.exit_code)
+
+
+@app.command()
+def report(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder that run has made.")],
+    scans: Annotated[
+        list[str], typer.Option(help="The scans: residuals, support and contours are then shown.")
+    ] = [],  # noqa: B006
+) -> None:
+    """Write report.html of a finished model folder anew."""
+    typer.echo(report_job(model, scans))
 
 
 @app.command()

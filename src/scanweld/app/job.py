@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld import pipeline
+from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import points_within
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import ScanFile, collect, printable, read_scan
+from scanweld.io import ScanFile, collect, printable, read_poses, read_scan
 from scanweld.knowledge import Knowledge
 from scanweld.prepare.thinning import thinned
 from scanweld.progress import Progress, silent
@@ -60,6 +61,7 @@ def run_job(
             progress=progress,
         )
         write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
+        write_html_report(workspace.staging, {scan.name: scan for scan in scans})
         workspace.publish()
     return result
 
@@ -87,3 +89,24 @@ def read_all(
             unreadable[file.name] = printable(str(error))
     progress("read", len(files), len(files))
     return scans, unreadable
+
+
+def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
+    """Write report.html of a finished model folder anew: ``scanweld report``.
+
+    Args:
+        folder: What ``scanweld run`` made.
+        inputs: The scans it was made of, if at hand.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        ScanweldError: If the folder is not whole, or the scans are not those of the run.
+    """
+    if not inputs:
+        return write_html_report(Path(folder))
+    placed = read_poses(Path(folder) / "poses.json").poses
+    files = [file for file in collect(inputs) if file.name in placed]
+    scans = {file.name: read_scan(file.path, file.name) for file in files}
+    return write_html_report(Path(folder), scans)
