@@ -9,8 +9,10 @@ from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 
 RESIDUAL_STOPS = ("#3b4cc0", "#6f9bd8", "#c9d7d9", "#f2c46d", "#e2703a", "#a50f26")
 """From no residual to the largest shown."""
-SUPPORT_STOPS = ("#d1345b", "#f0a03c", "#b9cf8b", "#5fae9b", "#2d7f9d", "#27548a")
+SUPPORT_STOPS = ("#b5179e", "#f0a03c", "#b9cf8b", "#5fae9b", "#2d7f9d", "#27548a")
 """Seen by at most 1, by 2, 3, 4, 5 and by 6 scans or more."""
+BORDER = "#ff2d2d"
+"""Open borders."""
 UNKNOWN = "#9a9a95"
 """Where nothing was measured."""
 GOLDEN = 0.6180339887498949

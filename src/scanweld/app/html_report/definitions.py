@@ -34,8 +34,8 @@ DEFINITIONS: Mapping[str, Definition] = {
     "edges": _defined("pairs", "names of the scans that it has an accepted pair with"),
     "scan_overlap": _defined(
         "overlap",
-        "largest share of its samples that agree (as above) with one other scan of its component, "
-        "at the final poses",
+        "largest share of its samples that agree with one other scan of its component, at the final "
+        "poses",
     ),
     "rms": _defined(
         "rms",
@@ -55,24 +55,21 @@ DEFINITIONS: Mapping[str, Definition] = {
         "than 12 degrees or 6 % of the diameter away), at most 1; 1 without a rival, 0 if s1 <= 0",
     ),
     "observability": _defined(
-        "observability", "smallest over largest eigenvalue of the information matrix, see below"
+        "observability", "smallest over largest eigenvalue of the information matrix; near 0 the pose can slide or turn without leaving the surface"
     ),
-    "kind": _defined("kind", "what the two scans alone say; see below"),
+    "kind": _defined("kind", "what the two scans alone say: good, sliding, ambiguous, contradicted or no overlap"),
     "accepted": _defined(
         "accepted",
         "whether the pair agrees with the poses that were found, and is used",
     ),
-    "agree": _defined("agree", "surface pixel, abs(z - d) <= t, n·m > 0.75"),
-    "contradict": _defined("contradict", "surface pixel, abs(z - d) <= t, n·m < 0.3"),
-    "front": _defined("front", "surface pixel, z < d - t: the sensor would have seen it"),
-    "occluded": _defined("occluded", "surface pixel, z > d + t: the sensor could not see it"),
+    "agree": _defined("agree", "share of samples that lie on the surface that the other sensor measured, and face the same way"),
+    "contradict": _defined("contradict", "share of samples that lie on that surface, but face another way"),
+    "front": _defined("front", "share of samples that lie before that surface: the sensor would have seen them"),
+    "occluded": _defined("occluded", "share of samples that lie behind that surface: the sensor could not see them"),
     "free": _defined(
-        "free",
-        "free pixel, farther than t outside the closed silhouette: the sensor looked past the "
-        "object there",
-    ),
+        "free","share of samples that lie where the sensor looked past the object"),
     "unknown": _defined(
-        "unknown", "any other pixel, and beyond an image that cuts the object off"
+        "unknown", "share of samples of which the sensor can say nothing"
     ),
     "residual": _defined(
         "residual",

@@ -23,7 +23,7 @@ from scanweld.app.html_report.model_folder import ModelFolder, PairEntry
 from scanweld.app.html_report.orientation import Orientation, as_seen_from
 from scanweld.app.html_report.scene import Scene, make_scene, payload
 from scanweld.app.html_report.sources import Sources
-from scanweld.app.html_report.stills import both_sides, three_sides
+from scanweld.app.html_report.stills import painted_sides, three_sides
 from scanweld.app.html_report.surface_check import (
     SurfaceCheck,
     check_surface,
@@ -59,6 +59,8 @@ def report_page(model: ModelFolder, sources: Sources | None, config: Config) -> 
         config: Settings of the run.
     """
     looks = scan_looks(list(model.report.scans))
+    sizes = [scan.diameter for scan in model.report.scans.values() if scan.diameter]
+    diameter = float(np.median(sizes)) if sizes else None
     environment = Environment(
         loader=PackageLoader("scanweld.app.html_report"),
         autoescape=True,
@@ -73,6 +75,7 @@ def report_page(model: ModelFolder, sources: Sources | None, config: Config) -> 
         count=numbers.count,
         duration=numbers.duration,
         length=lambda value: numbers.length(value, config.unit),
+        of_diameter=lambda value: numbers.of_diameter(value, diameter),
         exact=lambda value: Markup("") if value is None else repr(value),
         script_json=_script_json,
         count_of=len,
@@ -213,8 +216,8 @@ def _measured(
         "residual_end": scene.residual_end,
         "residual_stops": RESIDUAL_STOPS,
         "support_stops": SUPPORT_STOPS,
-        "heat": both_sides(scene.mesh, residual, orientation, "The model coloured by residual"),
-        "support": both_sides(scene.mesh, support, orientation, "The model coloured by support"),
+        "heat": painted_sides(scene.mesh, residual, orientation, "The model coloured by residual")[:2],
+        "support": painted_sides(scene.mesh, support, orientation, "The model coloured by support"),
     }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from scanweld.app.html_report.buffers import box_around, directions, packed, quantised, steps
 from scanweld.app.html_report.colors import (
+    BORDER,
     RESIDUAL_STOPS,
     SUPPORT_STOPS,
     UNKNOWN,
@@ -17,9 +18,14 @@ from scanweld.app.html_report.colors import (
 )
 from scanweld.app.html_report.orientation import Orientation
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
-from scanweld.app.html_report.surface_check import SurfaceCheck, median_edge, open_borders
+from scanweld.app.html_report.surface_check import (
+    SurfaceCheck,
+    median_edge,
+    open_borders,
+    spread,
+)
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
-from scanweld.geometry.mesh import TriangleMesh, vertex_normals
+from scanweld.geometry.mesh import TriangleMesh, border_vertices, vertex_normals
 
 MAX_VERTICES = 160_000
 """Of the model on the page."""
@@ -60,8 +66,13 @@ class Scene:
         return along(RESIDUAL_STOPS, self.residual / self.residual_end)
 
     def support_colors(self) -> ByteArray | None:
-        """(V, 3), or None where nothing was measured."""
-        return None if self.support is None else support_colors(self.support)
+        """(V, 3), open borders marked; or None where nothing was measured."""
+        if self.support is None:
+            return None
+        colors = support_colors(self.support)
+        on_border = border_vertices(self.mesh.faces, len(self.mesh.vertices))
+        colors[spread(on_border, self.mesh.faces, 1)] = rgb(BORDER)
+        return colors
 
 
 def make_scene(mesh: TriangleMesh, check: SurfaceCheck | None) -> Scene:
@@ -141,10 +152,12 @@ def payload(
     description = {
         "arrays": index,
         "basis": orientation.basis(),
+        "radius": float(np.linalg.norm(mesh.vertices - box.centre, axis=1).max()) / box.half,
         "pointSize": 2.4 * median_edge(mesh) / box.half,
         "residualStops": [rgb(color) for color in RESIDUAL_STOPS],
         "supportStops": [rgb(color) for color in SUPPORT_STOPS],
         "unknown": rgb(UNKNOWN),
+        "border": rgb(BORDER),
         "scanColors": [rgb(color) for color in scan_colors],
     }
     return description, text

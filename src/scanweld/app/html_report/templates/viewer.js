@@ -1,8 +1,8 @@
 // The model in WebGL: one program for the surface and the scans' points, one for open borders.
 
 const SURFACE_VERTEX = `#version 300 es
-uniform mat4 uView; uniform mat4 uProjection; uniform float uPointSize; uniform int uMode;
-uniform vec3 uStops[6]; uniform vec3 uSupport[6]; uniform vec3 uUnknown; uniform vec3 uBase; uniform sampler2D uScans;
+uniform mat4 uView; uniform mat4 uProjection; uniform float uPointSize; uniform highp int uMode;
+uniform vec3 uStops[6]; uniform vec3 uSupport[6]; uniform vec3 uUnknown; uniform vec3 uBase; uniform highp sampler2D uScans;
 in vec3 aPosition; in vec3 aNormal; in vec4 aColor; in vec2 aValue; in float aScan;
 out vec3 vNormal; out vec3 vPlace; out vec3 vColor;
 vec3 ramp(float share) {
@@ -25,7 +25,7 @@ void main() {
 }`;
 const SURFACE_FRAGMENT = `#version 300 es
 precision highp float;
-uniform int uMode; in vec3 vNormal; in vec3 vPlace; in vec3 vColor; out vec4 color;
+uniform highp int uMode; in vec3 vNormal; in vec3 vPlace; in vec3 vColor; out vec4 color;
 void main() {
   if (uMode == 1) { vec2 off = gl_PointCoord - 0.5; if (dot(off, off) > 0.25) discard; }
   vec3 toEye = normalize(-vPlace), normal = normalize(vNormal);
@@ -41,11 +41,11 @@ const LINE_VERTEX = `#version 300 es
 uniform mat4 uView; uniform mat4 uProjection; in vec3 aPosition;
 void main() { gl_Position = uProjection * uView * vec4(aPosition * 2.0 - 1.0, 1.0); gl_Position.z -= 0.0008 * gl_Position.w; }`;
 const LINE_FRAGMENT = `#version 300 es
-precision mediump float; out vec4 color; void main() { color = vec4(0.88, 0.18, 0.18, 1.0); }`;
+precision mediump float; uniform vec3 uColor; out vec4 color; void main() { color = vec4(uColor, 1.0); }`;
 
 const MODES = ["model", "scans", "residual", "support"];
-const FIELD = 0.5;          // half the vertical field of view, in radians
-const FIT = 1.16;           // room around the model
+const FIELD = 0.3;          // half the vertical field of view, in radians
+const ROOM = 0.98;          // around the model's sphere
 const STEP = 0.12;          // radians a key turns
 
 async function inflated(text) {
@@ -195,7 +195,7 @@ class Viewer {
 
   distance() {
     const aspect = this.canvas.clientWidth / this.canvas.clientHeight;
-    return FIT / Math.tan(FIELD) / Math.min(1, aspect) + 0.25;
+    return ROOM * this.scene.radius / Math.sin(Math.atan(Math.tan(FIELD) * Math.min(1, aspect)));
   }
 
   draw() {
@@ -203,7 +203,7 @@ class Viewer {
     const width = Math.max(1, Math.round(canvas.clientWidth * dense)), height = Math.max(1, Math.round(canvas.clientHeight * dense));
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const away = this.distance(), focus = this.zoom / Math.tan(FIELD);
-    const near = Math.max(0.05, away - 2), far = away + 2;
+    const near = away - 1.1 * this.scene.radius, far = away + 1.1 * this.scene.radius;
     const view = new Float32Array(this.rotation);
     view.set([...this.shift, -away], 12);
     const projection = new Float32Array([focus * height / width, 0, 0, 0, 0, focus, 0, 0,
@@ -246,7 +246,8 @@ class Viewer {
 
   drawBorders(view, projection) {
     const gl = this.gl;
-    this.matrices(this.line, view, projection);
+    const place = this.matrices(this.line, view, projection);
+    gl.uniform3f(place("uColor"), ...this.scene.border.map((byte) => byte / 255));
     gl.bindVertexArray(this.borders);
     gl.drawElements(gl.LINES, this.counts.borders, gl.UNSIGNED_INT, 0);
   }
