@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray, IntArray
 
 LARGEST = 65535
 """Of a coordinate, after quantising."""
@@ -32,26 +33,26 @@ def box_around(points: Sequence[FloatArray]) -> Box:
     return Box(centre=(x, y, z), half=float(0.5 * (high - low).max()) or 1.0)
 
 
-def quantised(points: FloatArray, box: Box) -> ByteArray:
+def quantised(points: FloatArray, box: Box) -> NDArray[np.uint16]:
     """Points (N, 3) as 16-bit numbers within the box."""
     share = (points - np.array(box.centre)) / (2 * box.half) + 0.5
     return np.rint(LARGEST * np.clip(share, 0, 1)).astype(np.uint16)
 
 
-def directions(normals: FloatArray) -> ByteArray:
+def directions(normals: FloatArray) -> NDArray[np.int8]:
     """Unit vectors (N, 3) as (N, 4) signed bytes, the last 0: a multiple of 4 bytes each."""
     padded = np.zeros((len(normals), 4), np.int8)
     padded[:, :3] = np.rint(127 * np.clip(np.nan_to_num(normals), -1, 1))
     return padded
 
 
-def steps(indices: IntArray) -> IntArray:
+def steps(indices: IntArray) -> NDArray[np.int32]:
     """Indices as differences from the one before, which compress well."""
     flat = indices.ravel().astype(np.int32)
     return np.diff(flat, prepend=np.int32(0)).astype(np.int32)
 
 
-def packed(arrays: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+def packed(arrays: Mapping[str, NDArray]) -> tuple[dict[str, Any], str]:
     """Where each array lies (type, offset, length), and all of them as base64 of deflated bytes."""
     index: dict[str, Any] = {}
     parts: list[bytes] = []

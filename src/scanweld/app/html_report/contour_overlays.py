@@ -83,9 +83,7 @@ def contour_overlays(
 
 
 def _panel(i: PreparedScan, j: PreparedScan, j_from_i: Pose, config: ContoursConfig) -> Panel:
-    found = contour_pair(
-        observe_contours(i, config), observe_contours(j, config), j_from_i, config
-    )
+    found = contour_pair(observe_contours(i, config), observe_contours(j, config), j_from_i, config)
     surface = np.isfinite(j.image.depth)
     return Panel(
         predicted_by=i.name,

@@ -36,5 +36,5 @@ def as_seen_from(world_from_sensor: Pose | None) -> Orientation:
     """The view of a sensor; without one, z up and seen from the front (-y)."""
     if world_from_sensor is None:
         return Orientation(front=np.array([0.0, -1.0, 0.0]), up=np.array([0.0, 0.0, 1.0]))
-    x, y, z = world_from_sensor.rotation.T
-    return Orientation(front=-np.asarray(z, float), up=-np.asarray(y, float))
+    rotation = world_from_sensor.rotation  # columns: right, down, away
+    return Orientation(front=-rotation[:, 2], up=-rotation[:, 1])

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from os.path import commonprefix
 from typing import Any
 
 import numpy as np
@@ -99,8 +98,7 @@ def scan_looks(names: Sequence[str]) -> dict[str, ScanLook]:
     """Number, short label and colour of each scan, in natural order of their names."""
     ordered = sorted(names, key=natural_key)
     colors = scan_colors(len(ordered))
-    prefix = commonprefix(ordered) if len(ordered) > 1 else ""
-    prefix = prefix.rstrip("0123456789")  # 01 to 09 are not 1 to 9
+    prefix = _shared_beginning(ordered).rstrip("0123456789")  # 01 to 09 are not 1 to 9
     labels = [name.removeprefix(prefix) or name for name in ordered]
     if max(map(len, labels), default=0) > LONGEST_LABEL:
         labels = [str(k + 1) for k in range(len(ordered))]
@@ -110,14 +108,21 @@ def scan_looks(names: Sequence[str]) -> dict[str, ScanLook]:
     }
 
 
+def _shared_beginning(names: Sequence[str]) -> str:
+    """What all names begin with; nothing if there is only one."""
+    if len(names) < 2:
+        return ""
+    first, last = min(names), max(names)
+    same = [a == b for a, b in zip(first, last, strict=False)]
+    return first[: same.index(False)] if False in same else first[: len(same)]
+
+
 def _outcome(model: ModelFolder) -> dict[str, Any]:
     """The first screen's words and numbers."""
     report, poses = model.report, model.poses
     names = sorted(report.scans, key=natural_key)
     placed = [name for name in names if name in poses.poses]
-    sentence = verdict_sentence(
-        report.verdict, len(names), len(placed), len(poses.components)
-    )
+    sentence = verdict_sentence(report.verdict, len(names), len(placed), len(poses.components))
     of = lambda kind: [name for name in names if report.scans[name].verdict is kind]  # noqa: E731
     has_confidence = any(scan.confidence is not None for scan in report.scans.values())
     return {
@@ -179,7 +184,8 @@ def _surface(
     check = None if sources is None else check_surface(mesh, sources.points_of_model())
     sensor = None if sources is None else sources.world_from_reference_sensor()
     orientation = as_seen_from(sensor)
-    scene = make_scene(mesh, check)
+    borders = open_borders(mesh)
+    scene = make_scene(mesh, borders, check)
     shown = [] if check is None else list(check.points)
     described, buffers = payload(scene, orientation, [looks[name].color for name in shown])
     return {
@@ -188,7 +194,7 @@ def _surface(
             "faces": len(mesh.faces),
             "shown_faces": len(scene.mesh.faces),
             "sides": three_sides(scene.mesh, orientation),
-            "borders": open_borders(mesh),
+            "borders": borders,
             "scene": described,
             "buffers": buffers,
             "shown_scans": shown,
@@ -205,9 +211,7 @@ def _measured(
     residual, support = scene.residual_colors(), scene.support_colors()
     if found is None or model.mesh is None or residual is None or support is None:
         return None
-    per_scan = {
-        name: histogram(np.sort(np.abs(part))) for name, part in check.distances.items()
-    }
+    per_scan = {name: histogram(np.sort(np.abs(part))) for name, part in check.distances.items()}
     return {
         "histogram": found,
         "per_scan": per_scan,
@@ -216,7 +220,9 @@ def _measured(
         "residual_end": scene.residual_end,
         "residual_stops": RESIDUAL_STOPS,
         "support_stops": SUPPORT_STOPS,
-        "heat": painted_sides(scene.mesh, residual, orientation, "The model coloured by residual")[:2],
+        "heat": painted_sides(scene.mesh, residual, orientation, "The model coloured by residual")[
+            :2
+        ],
         "support": painted_sides(scene.mesh, support, orientation, "The model coloured by support"),
     }
 

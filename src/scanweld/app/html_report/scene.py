@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scanweld.app.html_report.buffers import box_around, directions, packed, quantised, steps
 from scanweld.app.html_report.colors import (
@@ -19,13 +20,13 @@ from scanweld.app.html_report.colors import (
 from scanweld.app.html_report.orientation import Orientation
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
 from scanweld.app.html_report.surface_check import (
+    OpenBorders,
     SurfaceCheck,
     median_edge,
-    open_borders,
     spread,
 )
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
-from scanweld.geometry.mesh import TriangleMesh, border_vertices, vertex_normals
+from scanweld.geometry.mesh import TriangleMesh, vertex_normals
 
 MAX_VERTICES = 160_000
 """Of the model on the page."""
@@ -43,6 +44,7 @@ class Scene:
 
     Attributes:
         mesh: With normals, and colours if the model has them.
+        borders: (B, 2) vertices of the open borders' edges, those of the model before thinning.
         residual: (V,) in the scans' unit, NaN where unknown; or None.
         support: (V,) scans; or None.
         residual_end: Residual at the end of the colour scale.
@@ -52,6 +54,7 @@ class Scene:
     """
 
     mesh: TriangleMesh
+    borders: IntArray
     residual: FloatArray | None = None
     support: IntArray | None = None
     residual_end: float = 1.0
@@ -70,12 +73,13 @@ class Scene:
         if self.support is None:
             return None
         colors = support_colors(self.support)
-        on_border = border_vertices(self.mesh.faces, len(self.mesh.vertices))
+        on_border = np.zeros(len(colors), bool)
+        on_border[self.borders.ravel()] = True
         colors[spread(on_border, self.mesh.faces, 1)] = rgb(BORDER)
         return colors
 
 
-def make_scene(mesh: TriangleMesh, check: SurfaceCheck | None) -> Scene:
+def make_scene(mesh: TriangleMesh, borders: OpenBorders, check: SurfaceCheck | None) -> Scene:
     """Thin the model and the scans to what a page can hold."""
     cluster = cluster_vertices(mesh.vertices, MAX_VERTICES)
     vertices = cluster_means(cluster, mesh.vertices)
@@ -86,8 +90,10 @@ def make_scene(mesh: TriangleMesh, check: SurfaceCheck | None) -> Scene:
     shown = TriangleMesh(
         vertices=vertices, faces=faces, normals=vertex_normals(vertices, faces), colors=colors
     )
+    edges = cluster[borders.edges]
+    edges = edges[edges[:, 0] != edges[:, 1]]
     if check is None:
-        return Scene(mesh=shown)
+        return Scene(mesh=shown, borders=edges)
     residual = cluster_means(cluster, check.residual[:, None])[:, 0]
     known = residual[np.isfinite(residual)]
     end = float(np.quantile(known, RESIDUAL_QUANTILE)) if len(known) else 0.0
@@ -95,6 +101,7 @@ def make_scene(mesh: TriangleMesh, check: SurfaceCheck | None) -> Scene:
     points, normals, number = _thinned(check, vertex_normals(mesh.vertices, mesh.faces))
     return Scene(
         mesh=shown,
+        borders=edges,
         residual=residual,
         support=support.astype(np.int64),
         residual_end=end or 1.0,
@@ -104,9 +111,7 @@ def make_scene(mesh: TriangleMesh, check: SurfaceCheck | None) -> Scene:
     )
 
 
-def _thinned(
-    check: SurfaceCheck, normals: FloatArray
-) -> tuple[FloatArray, FloatArray, IntArray]:
+def _thinned(check: SurfaceCheck, normals: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
     """Points of all scans, the model's normals there, and the scans' numbers."""
     total = sum(map(len, check.points.values()))
     rng = np.random.default_rng(0)  # evenly strided points of a grid would show its columns
@@ -132,12 +137,11 @@ def payload(
     """
     mesh = scene.mesh
     box = box_around([mesh.vertices])
-    borders = open_borders(mesh).edges
-    arrays: dict[str, Any] = {
+    arrays: dict[str, NDArray] = {
         "position": quantised(mesh.vertices, box),
         "normal": directions(np.zeros((0, 3)) if mesh.normals is None else mesh.normals),
         "faces": steps(mesh.faces),
-        "borders": steps(borders),
+        "borders": steps(scene.borders),
     }
     if mesh.colors is not None:
         opaque = np.full((len(mesh.colors), 1), 255, np.uint8)

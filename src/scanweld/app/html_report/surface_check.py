@@ -112,12 +112,14 @@ def thin_share(mesh: TriangleMesh, support: IntArray) -> float:
 def open_borders(mesh: TriangleMesh) -> OpenBorders:
     """The edges that only one face has, and the pieces they form."""
     edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
-    border = unique[counts == 1]
+    size = len(mesh.vertices)
+    keys, counts = np.unique(edges[:, 0] * size + edges[:, 1], return_counts=True)
+    once = keys[counts == 1]
+    border = np.stack([once // size, once % size], axis=1)
     if not len(border):
         return OpenBorders(edges=border, num_holes=0, length=0.0, longest=0.0)
     lengths = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1)
-    piece = _pieces(border, len(mesh.vertices))
+    piece = _pieces(border, size)
     per_piece = np.bincount(piece, weights=lengths)
     return OpenBorders(
         edges=border,

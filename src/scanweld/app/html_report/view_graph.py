@@ -60,9 +60,7 @@ def draw_graph(
     groups += [list(unplaced)] if unplaced else []
     places = _places(groups)
     nodes = tuple(_node(name, angle, len(places) > 16) for name, angle in places.items())
-    links = [
-        _link(pair, places) for pair in pairs if pair.accepted or pair.kind is PairKind.GOOD
-    ]
+    links = [_link(pair, places) for pair in pairs if pair.accepted or pair.kind is PairKind.GOOD]
     links.sort(key=lambda link: (link.level is None, link.level or 0))
     return GraphDrawing(nodes=nodes, links=tuple(links), is_dense=len(places) > 24)
 
@@ -116,10 +114,10 @@ def _point(angle: float, radius: float) -> tuple[float, float]:
 def _node(name: str, angle: float, is_turned: bool) -> Node:
     x, y = _point(angle, RADIUS)
     label_x, label_y = _point(angle, RADIUS + 13)
-    is_right = np.sin(angle) > 1e-6
+    is_right = angle < np.pi - 1e-6
     is_middle = abs(np.sin(angle)) < 1e-6 and not is_turned
-    turn = np.degrees(angle) - (90 if np.sin(angle) >= 0 else 270) if is_turned else 0.0
-    anchor = "middle" if is_middle else "start" if is_right or is_turned and turn == -90 else "end"
+    turn = np.degrees(angle) - (90 if is_right else 270) if is_turned else 0.0
+    anchor = "middle" if is_middle else "start" if is_right else "end"
     return Node(
         name=name,
         x=x,
