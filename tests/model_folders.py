@@ -11,7 +11,7 @@ from scanweld.app.outputs import write_outputs
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.scan import RangeScan
 from scanweld.reconstruction import Reconstruction
-from tests.results import a_pair, a_result
+from tests.results import a_pair, a_result, no_pair
 from tests.scenes import Scene, scene_of, small_creature
 
 
@@ -64,15 +64,16 @@ def whole_folder(folder: Path) -> Made:
 
 
 def crowd(folder: Path, names: Sequence[str]) -> Path:
-    """A folder of many scans, of which every two are a pair, and a model of one triangle."""
+    """A folder of many scans from around, of which every two are a pair, and one triangle."""
     pairs = []
-    for k, (i, j) in enumerate(combinations(sorted(names), 2)):
-        score = (k * 37 % 100) / 100 - 0.2
-        pairs.append(
-            dataclasses.replace(
-                a_pair(i, j), accepted=score > 0.1, score=score, reason="" if score > 0.1 else "no"
-            )
-        )
+    for i, j in combinations(range(len(names)), 2):
+        gap = min(j - i, len(names) - j + i)
+        pair = a_pair(names[i], names[j])
+        if gap > 9:
+            pair = no_pair(names[i], names[j])
+        elif gap == 7:
+            pair = dataclasses.replace(pair, accepted=False, reason="the others contradict it")
+        pairs.append(dataclasses.replace(pair, score=0.7 - 0.09 * gap) if gap <= 9 else pair)
     return written(folder, dataclasses.replace(a_result(names), pairs=tuple(pairs)))
 
 

@@ -359,7 +359,7 @@ def test_labels_are_short_and_numbers_keep_their_zeros():
         "10",
     ]
     assert [look.label for look in scan_looks(["a_08", "a_09"]).values()] == ["08", "09"]
-    looks = scan_looks(["the first of all", "another"])
+    looks = scan_looks(["the first of all", "another one"])
     assert [look.label for look in looks.values()] == ["1", "2"]
     assert len(set(scan_colors(60))) == 60
 

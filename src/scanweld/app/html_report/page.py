@@ -35,17 +35,26 @@ from scanweld.config import Config
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanVerdict
 
-LONGEST_LABEL = 7
-"""Longer short names give way to the scans' numbers."""
+LONGEST_LABEL = 9
+"""Where names are longer, without what they all begin with, the scans are called by numbers."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScanLook:
-    """How a scan is called and coloured all over the page."""
+    """How a scan is called and coloured all over the page.
+
+    Attributes:
+        number: From 1, in natural order of the names.
+        name: Of the scan.
+        label: Short, for drawings.
+        is_numbered: Whether that is the number, which then stands beside the name elsewhere.
+        color: As ``#rrggbb``.
+    """
 
     number: int
     name: str
     label: str
+    is_numbered: bool
     color: str
 
 
@@ -85,6 +94,7 @@ def report_page(model: ModelFolder, sources: Sources | None, config: Config) -> 
         defined=DEFINITIONS,
         has_scans=sources is not None,
         looks=looks,
+        diameter=diameter,
         **_outcome(model),
         **_graph(model, looks),
         **_surface(model, sources, looks),
@@ -100,10 +110,13 @@ def scan_looks(names: Sequence[str]) -> dict[str, ScanLook]:
     colors = scan_colors(len(ordered))
     prefix = _shared_beginning(ordered).rstrip("0123456789")  # 01 to 09 are not 1 to 9
     labels = [name.removeprefix(prefix) or name for name in ordered]
-    if max(map(len, labels), default=0) > LONGEST_LABEL:
+    is_numbered = max(map(len, labels), default=0) > LONGEST_LABEL
+    if is_numbered:
         labels = [str(k + 1) for k in range(len(ordered))]
     return {
-        name: ScanLook(number=k + 1, name=name, label=labels[k], color=colors[k])
+        name: ScanLook(
+            number=k + 1, name=name, label=labels[k], is_numbered=is_numbered, color=colors[k]
+        )
         for k, name in enumerate(ordered)
     }
 

@@ -9,7 +9,7 @@ from scanweld.app.html_report.model_folder import PairEntry
 from scanweld.pairs.result import PairKind
 
 SIZE = 420.0
-RADIUS = 148.0
+RADIUS = 158.0
 LEVELS = 5
 """Steps of score that are drawn differently."""
 FULL_SCORE = 0.6
@@ -60,7 +60,12 @@ def draw_graph(
     groups += [list(unplaced)] if unplaced else []
     places = _places(groups)
     nodes = tuple(_node(name, angle, len(places) > 16) for name, angle in places.items())
-    links = [_link(pair, places) for pair in pairs if pair.accepted or pair.kind is PairKind.GOOD]
+    thinner = min(1.0, 16 / max(len(places), 1))
+    links = [
+        _link(pair, places, thinner)
+        for pair in pairs
+        if pair.accepted or pair.kind is PairKind.GOOD
+    ]
     links.sort(key=lambda link: (link.level is None, link.level or 0))
     return GraphDrawing(nodes=nodes, links=tuple(links), is_dense=len(places) > 24)
 
@@ -129,9 +134,9 @@ def _node(name: str, angle: float, is_turned: bool) -> Node:
     )
 
 
-def _link(pair: PairEntry, places: Mapping[str, float]) -> Link:
+def _link(pair: PairEntry, places: Mapping[str, float], thinner: float) -> Link:
     x1, y1 = _point(places[pair.i], RADIUS)
     x2, y2 = _point(places[pair.j], RADIUS)
     level = score_level(pair.score) if pair.accepted else None
     width = 1.2 if level is None else 0.8 + 0.9 * level
-    return Link(pair=pair, x1=x1, y1=y1, x2=x2, y2=y2, level=level, width=round(width, 2))
+    return Link(pair=pair, x1=x1, y1=y1, x2=x2, y2=y2, level=level, width=round(width * thinner, 2))
