@@ -377,6 +377,8 @@ def test_the_drawing_has_every_scan_once():
         (numbers.score(float("nan")), "–"),
         (numbers.length(0.0005489, None), "0.000549"),
         (numbers.length(12.345, "mm"), "12.3\u00a0mm"),
+        (numbers.length(0.0000503, "m"), "0.0503\u00a0mm"),
+        (numbers.length(2.76, "m"), "2.76\u00a0m"),
         (numbers.length(0.0, None), "0"),
         (numbers.length(1.5e-7, None), "1.50·10⁻⁷"),
         (numbers.of_diameter(0.5, 250.0), "0.20\u00a0%"),

@@ -2,6 +2,7 @@
 
 import math
 
+_METRES = {"m": 1.0, "cm": 0.01}
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -21,10 +22,13 @@ def score(value: float | None) -> str:
 
 
 def length(value: float | None, unit: str | None) -> str:
-    """A length with three digits, and its unit if that is known."""
-    if _is_missing(value):
+    """A length with three digits, and its unit if that is known; less than a metre in mm."""
+    if value is None or _is_missing(value):
         return "–"
-    return f"{_plain(value)}\u00a0{unit}" if unit else _plain(value)  # type: ignore[arg-type]
+    metres = value * _METRES.get(unit or "", 0.0)
+    if 0 < metres < 1:
+        value, unit = 1000 * metres, "mm"
+    return f"{_plain(value)}\u00a0{unit}" if unit else _plain(value)
 
 
 def of_diameter(value: float, diameter: float | None) -> str:

@@ -12,6 +12,7 @@ function showTip(element) {
   const text = tipText(element);
   if (!text) return;
   tip.textContent = text;
+  tip.of = element;
   tip.hidden = false;
   const from = element.getBoundingClientRect(), size = tip.getBoundingClientRect();
   const left = Math.min(Math.max(8, from.left + from.width / 2 - size.width / 2), innerWidth - size.width - 8);
@@ -21,6 +22,12 @@ function showTip(element) {
 }
 
 function hideTip() { tip.hidden = true; }
+
+// Going to an element by keyboard scrolls to it; its tip goes along.
+function afterScroll() {
+  const at = document.activeElement?.closest?.("[data-tip], [data-def]");
+  if (at && at === tip.of) showTip(at); else hideTip();
+}
 
 // Titles work without this script; with it they also show on focus and on touch.
 for (const element of document.querySelectorAll("main [title], header [title]")) {
@@ -35,7 +42,7 @@ const tipped = (event) => event.target.closest?.("[data-tip], [data-def]");
 document.addEventListener("pointerover", (event) => { const at = tipped(event); if (at) showTip(at); else hideTip(); });
 document.addEventListener("focusin", (event) => { const at = tipped(event); if (at) showTip(at); });
 document.addEventListener("focusout", hideTip);
-document.addEventListener("scroll", hideTip, { passive: true, capture: true });
+document.addEventListener("scroll", afterScroll, { passive: true, capture: true });
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") hideTip(); });
 for (const term of document.querySelectorAll(".term")) term.setAttribute("aria-describedby", `def-${term.dataset.def}`);
 
