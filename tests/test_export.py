@@ -238,7 +238,7 @@ def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[
         ("report.json", ["--poses", "conf"], "scan_01: its file is not where"),
         ("config.toml=[pairs", ["--model", "glb"], "config.toml"),
         ("report.json={", ["--poses", "mlp"], "report.json: not valid JSON"),
-        ("report.json={}", ["--poses", "mlp"], "report.json: has no scans"),
+        ("report.json={}", ["--poses", "mlp"], "report.json: scans: field required"),
         ("poses.json=[]", ["--poses", "mlp"], "poses.json"),
         ('poses.json={"format": 1, "scans": {}}', ["--poses", "mlp"], "no scan is placed"),
         ("no faces", ["--model", "stl"], "has no faces"),

@@ -20,11 +20,16 @@ from scanweld.app.html_report.histogram import histogram
 from scanweld.app.html_report.page import scan_looks
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
 from scanweld.app.html_report.surface_check import check_surface, open_borders, thin_share
-from scanweld.app.html_report.view_graph import draw_graph, round_order
+from scanweld.app.html_report.view_graph import draw_graph, pair_level, round_order
+from scanweld.app.model_files import PairEntry
+from scanweld.app.outputs import write_outputs
 from scanweld.errors import InputError, ReadError
 from scanweld.evaluation.primitives import sphere
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.io import write_scan_ply
+from scanweld.pairs.result import PairKind
+from scanweld.pairs.slippage import Slide
+from scanweld.reconstruction import FactReport, FactVerdict
 from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
 from tests.results import a_pair, a_result, no_pair
 
@@ -119,7 +124,7 @@ def test_numbers_are_those_of_the_files(made: Made, page: Page):
     shown = json.loads(page.text["pairs-data"])
     assert len(shown) == len(graph["pairs"])
     for pair, found in zip(graph["pairs"], shown, strict=True):
-        assert found.items() <= {**pair, "confidence": None}.items()
+        assert found.items() <= {"confidence": None, **pair}.items()
     assert f"All {len(report['scans'])} scans are placed." in page.words
 
 
@@ -261,6 +266,37 @@ def test_several_components_are_told_apart(tmp_path: Path):
     assert any("Component 2" in each for each in words) and "reference d" in words
 
 
+def test_what_was_known_beforehand_is_shown_with_what_became_of_it(tmp_path: Path):
+    facts = (
+        FactReport(fact="fix a", verdict=FactVerdict.HELD, reason="a: its frame is the world"),
+        FactReport(fact="apart a b", verdict=FactVerdict.CONTRADICTED, reason="they are one"),
+    )
+    folder = written(tmp_path, dataclasses.replace(a_result(["a", "b"]), knowledge=facts))
+    write_html_report(folder)
+    page = page_of(folder)
+    assert "Known beforehand" in page.words
+    assert {"fix a", " held: a: its frame is the world"} <= set(page.words)
+    assert {"apart a b", " contradicted: they are one"} <= set(page.words)
+    assert any(found.get("class") == "contradicted" for _, found in page.elements)
+
+
+def test_pairs_are_drawn_by_confidence_where_there_is_one():
+    told = {"kind": "good", "accepted": True, "reason": "", "overlap": 0.5, "evidence": None}
+    told |= {"i": "a", "j": "b", "margin": 1.0, "observability": 0.1, "score": 0.6}
+    assert pair_level(PairEntry.model_validate(told)) == 4
+    assert pair_level(PairEntry.model_validate({**told, "score": None})) == 0
+    assert pair_level(PairEntry.model_validate({**told, "confidence": 0.5})) == 2
+
+
+def test_what_a_pair_slides_like_is_shown(tmp_path: Path):
+    sliding = dataclasses.replace(a_pair("a", "b"), kind=PairKind.SLIDING, sliding=Slide.CYLINDER)
+    folder = written(tmp_path, dataclasses.replace(a_result(["a", "b"]), pairs=(sliding,)))
+    write_html_report(folder)
+    told = [found["title"] for _, found in page_of(folder).elements if "title" in found]
+    assert any("alone: sliding (cylinder), score" in words for words in told)
+    assert json.loads(page_of(folder).text["pairs-data"])[0]["sliding"] == "cylinder"
+
+
 def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
     folder = written(tmp_path, good_result(small_scene()))
     for name, key in (("report.json", "scans"), ("graph.json", "pairs")):
@@ -271,7 +307,7 @@ def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
         (folder / name).write_text(json.dumps(content))
     write_html_report(folder)
     page = page_of(folder)
-    assert "0.98765" in page.values()
+    assert "0.98765" in page.values() and "98.8\u00a0%" in page.words
     assert all(pair["confidence"] == 0.98765 for pair in json.loads(page.text["pairs-data"]))
 
 
@@ -279,9 +315,9 @@ def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
     ("name", "content", "told"),
     [
         ("report.json", None, "report.json: is missing"),
-        ("graph.json", "[1, 2", "graph.json: cannot be read"),
+        ("graph.json", "[1, 2", "graph.json: not valid JSON"),
         ("graph.json", '{"format": 7, "pairs": []}', "graph.json: format"),
-        ("poses.json", None, "poses.json: cannot be read"),
+        ("poses.json", None, "holds no poses.json"),
         ("report.json", '{"format": 1}', "report.json: verdict: field required"),
         ("model.ply", "ply\nformat", "model.ply"),
     ],
@@ -327,11 +363,22 @@ def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixt
     folder = written(tmp_path / "model", result)
     assert run("report", folder, "--scans", scans) == 0
     assert capsys.readouterr().out.strip() == str(folder / "report.html")
-    assert len([tag for tag, _ in page_of(folder).elements if tag == "img"]) == 8
+    assert num_pictures(folder) == 8
+    assert run("report", folder) == 0  # where they are, this folder does not say
+    assert num_pictures(folder) == 3
+    write_outputs(result, folder, {scan.name: f"../scans/{scan.name}.ply" for scan in read})
+    assert run("report", folder) == 0
+    assert num_pictures(folder) == 8
+    assert run("report", folder, "--scans", scans / f"{read[0].name}.ply") == 1
+    assert "its file is not among the scans given" in capsys.readouterr().err
     (folder / "graph.json").unlink()
     assert run("report", folder) == 1
     assert capsys.readouterr().err.startswith("scanweld: error: ")
     assert run("report", tmp_path / "none") == 1
+
+
+def num_pictures(folder: Path) -> int:
+    return len([tag for tag, _ in page_of(folder).elements if tag == "img"])
 
 
 def run(*arguments: str | Path) -> int:

@@ -172,7 +172,7 @@ def run(
 def report(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder that run has made.")],
     scans: Annotated[
-        list[str], typer.Option(help="The scans: residuals, support and contours are then shown.")
+        list[str], typer.Option(help="The scans, if they have been moved since.")
     ] = [],  # noqa: B006
 ) -> None:
     """Write report.html of a finished model folder anew."""

@@ -14,7 +14,7 @@ from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import collect, natural_key, read_scan, write_whole
+from scanweld.io import natural_key, read_scan, write_whole
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
@@ -112,15 +112,7 @@ def _find_files(
     formats = [FORMATS[name] for name in wanted.poses]
     if not (_reads_scans(wanted) or any(form.needs_files for form in formats)):
         return {}
-    found = {file.name: file.path for file in collect(scans)} if scans else model.files
-    for name in names:
-        if name not in found or not found[name].is_file():
-            place = f" ({found[name]})" if name in found else ""
-            where = "among the scans given" if scans else f"where the model says{place}"
-            raise InputError(
-                f"{printed(name)}: its file is not {where}; name all scans with --scans"
-            )
-    return {name: found[name] for name in names}
+    return model.scan_files(names, scans)
 
 
 def _reads_scans(wanted: Wanted) -> bool:
@@ -175,7 +167,9 @@ def _posed(
 
 
 def _model(model: ModelFolder, name: str, wanted: Wanted) -> bytes:
-    mesh = model.mesh()
+    mesh = model.mesh
+    if mesh is None:
+        raise InputError(f"{model.path}: holds no model.ply, so there is no model to export")
     if name == "ply":
         return model.mesh_path.read_bytes()
     writers: dict[str, Callable[[TriangleMesh], bytes]] = {

@@ -1,5 +1,6 @@
-"""The main job: files to an output folder."""
+"""The main job, files to an output folder; and its report written anew."""
 
+import logging
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,16 +8,19 @@ from pathlib import Path
 from scanweld import pipeline
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import points_within
+from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
-from scanweld.errors import ReadError
+from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import ScanFile, collect, printable, read_poses, read_scan
+from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.knowledge import Knowledge
 from scanweld.prepare.thinning import thinned
 from scanweld.progress import Progress, silent
 from scanweld.reconstruction import Reconstruction
+
+logger = logging.getLogger(__name__)
 
 
 def run_job(
@@ -96,7 +100,8 @@ def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
 
     Args:
         folder: What ``scanweld run`` made.
-        inputs: The scans it was made of, if at hand.
+        inputs: The scans it was made of, where they are no longer where the report says. Where
+            they are not found at all, the page goes without what only they can tell.
 
     Returns:
         Path of the page.
@@ -104,9 +109,13 @@ def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
     Raises:
         ScanweldError: If the folder is not whole, or the scans are not those of the run.
     """
-    if not inputs:
-        return write_html_report(Path(folder))
-    placed = read_poses(Path(folder) / "poses.json").poses
-    files = [file for file in collect(inputs) if file.name in placed]
-    scans = {file.name: read_scan(file.path, file.name) for file in files}
-    return write_html_report(Path(folder), scans)
+    model = open_model(Path(folder))
+    try:
+        files = model.scan_files(model.poses.poses, inputs)
+    except InputError as error:
+        if inputs:
+            raise
+        logger.warning("%s; without them there are no residuals, support and contours", error)
+        return write_html_report(model.path)
+    scans = {name: read_scan(path, name) for name, path in files.items()}
+    return write_html_report(model.path, scans)

@@ -1,76 +1,110 @@
 """A model's folder, as ``scanweld run`` and ``scanweld fuse`` write it, opened again."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
+from scanweld.app.model_files import Files, Graph, Report, read_entries
 from scanweld.config import Unit, load_config
-from scanweld.errors import ReadError
+from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.io import PoseSet, read_mesh, read_poses
-from scanweld.io.poses import load_json, read_text
+from scanweld.io import PoseSet, collect, read_mesh, read_poses
+from scanweld.io.pose_formats.records import printed
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ModelFolder:
-    """What a model's folder says; its mesh is read when it is asked for.
+    """A model's folder; but for the poses, what it holds is read when it is asked for, and once.
 
     Attributes:
         path: Of the folder.
         poses: Poses of the scans, and its components.
-        unit: Of the scans; None where unknown.
-        files: Where the scans' files were, by name; they need not be there still.
     """
 
     path: Path
     poses: PoseSet
-    unit: Unit | None
-    files: Mapping[str, Path]
 
     @property
     def mesh_path(self) -> Path:
         """Where the mesh is."""
         return self.path / "model.ply"
 
-    def mesh(self) -> TriangleMesh:
-        """The mesh of the largest component.
+    @cached_property
+    def mesh(self) -> TriangleMesh | None:
+        """The mesh of the largest component; None where there is none.
 
         Raises:
-            ReadError: If there is none, it is broken, or it has no faces.
+            ReadError: If it is broken, or has no faces.
         """
-        if not self.mesh_path.is_file():
-            raise ReadError(f"{self.path}: holds no model.ply, so there is no model to export")
-        return read_mesh(self.mesh_path)
+        return read_mesh(self.mesh_path) if self.mesh_path.is_file() else None
+
+    @cached_property
+    def report(self) -> Report:
+        """What a run reports.
+
+        Raises:
+            ReadError: If it is missing or broken, or no run has made the folder.
+        """
+        return read_entries(self.path / "report.json", Report)
+
+    @cached_property
+    def graph(self) -> Graph:
+        """All pairs of a run.
+
+        Raises:
+            ReadError: If it is missing or broken.
+        """
+        return read_entries(self.path / "graph.json", Graph)
+
+    @cached_property
+    def unit(self) -> Unit | None:
+        """Of the scans; None where unknown.
+
+        Raises:
+            ConfigError: If the settings are broken.
+        """
+        settings = self.path / "config.toml"
+        return load_config(settings).unit if settings.is_file() else None
+
+    def scan_files(self, names: Iterable[str], given: Sequence[Path | str] = ()) -> dict[str, Path]:
+        """Where the files of some scans are: among those given, else where the report says.
+
+        Args:
+            names: Of the scans.
+            given: Files, folders and glob patterns, where the scans have been moved.
+
+        Raises:
+            InputError: If one of them is not there.
+            ReadError: If the report is broken.
+        """
+        found = {file.name: file.path for file in collect(given)} if given else self._told_files()
+        names = list(names)
+        for name in names:
+            if name not in found or not found[name].is_file():
+                place = f" ({found[name]})" if name in found else ""
+                where = "among the scans given" if given else f"where the model says{place}"
+                raise InputError(
+                    f"{printed(name)}: its file is not {where}; name all scans with --scans"
+                )
+        return {name: found[name] for name in names}
+
+    def _told_files(self) -> Mapping[str, Path]:
+        report = self.path / "report.json"
+        if not report.is_file():
+            return {}
+        scans = read_entries(report, Files).scans
+        return {name: self.path / scan.file for name, scan in scans.items() if scan.file}
 
 
 def open_model(path: Path) -> ModelFolder:
-    """Read what a model's folder says.
-
-    Parts that are missing count as unknown, but for the poses.
+    """Open a model's folder.
 
     Raises:
-        ScanweldError: If it is no such folder, or a part of it is broken.
+        ReadError: If it is no such folder, or its poses are broken.
     """
     if not (path / "poses.json").is_file():
         raise ReadError(
             f"{path}: holds no poses.json; name a folder that scanweld run or fuse has made"
         )
-    settings = path / "config.toml"
-    return ModelFolder(
-        path=path,
-        poses=read_poses(path / "poses.json"),
-        unit=load_config(settings).unit if settings.is_file() else None,
-        files=_files(path),
-    )
-
-
-def _files(folder: Path) -> dict[str, Path]:
-    """Where the report says that the scans' files are."""
-    report = folder / "report.json"
-    if not report.is_file():
-        return {}
-    scans = load_json(report, read_text(report)).get("scans")
-    if not isinstance(scans, dict):
-        raise ReadError(f"{report}: has no scans; restore the file or remove it")
-    told = {name: scan.get("file") for name, scan in scans.items() if isinstance(scan, dict)}
-    return {name: folder / file for name, file in told.items() if isinstance(file, str)}
+    return ModelFolder(path=path, poses=read_poses(path / "poses.json"))

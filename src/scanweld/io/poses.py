@@ -123,7 +123,7 @@ def load_json(path: Path, text: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise ReadError(f"{path}: not valid JSON ({error}); correct or replace it") from error
     if not isinstance(content, dict):
-        raise ReadError(f"{path}: not a JSON object of poses by name; give a file of poses")
+        raise ReadError(f"{path}: not a JSON object; give another file")
     return content
 
 

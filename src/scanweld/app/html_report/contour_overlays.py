@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanweld.app.html_report.model_folder import PairEntry
+from scanweld.app.model_files import PairEntry
 from scanweld.config import ContoursConfig
 from scanweld.contours.coherence import coherence, contour_pair
 from scanweld.contours.contour_sets import ContourPoints, observe_contours

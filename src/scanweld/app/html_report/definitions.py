@@ -54,8 +54,8 @@ DEFINITIONS: Mapping[str, Definition] = {
     ),
     "observability": _defined(
         "observability",
-        "smallest over largest eigenvalue of the information matrix; near 0 the pose can slide or "
-        "turn without leaving the surface",
+        "smallest over largest eigenvalue of the information matrix, 0 if the smallest is "
+        "negative; near 0 the pose can slide or turn without leaving the surface",
     ),
     "kind": _defined(
         "kind", "what the two scans alone say: good, sliding, ambiguous, contradicted or no overlap"

@@ -18,7 +18,6 @@ from scanweld.app.html_report.colors import (
 from scanweld.app.html_report.contour_overlays import Overlay, contour_overlays
 from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
-from scanweld.app.html_report.model_folder import ModelFolder, PairEntry
 from scanweld.app.html_report.orientation import Orientation, as_seen_from
 from scanweld.app.html_report.scene import Scene, make_scene, payload
 from scanweld.app.html_report.sources import Sources
@@ -29,7 +28,9 @@ from scanweld.app.html_report.surface_check import (
     open_borders,
     thin_share,
 )
-from scanweld.app.html_report.view_graph import draw_graph, score_level
+from scanweld.app.html_report.view_graph import draw_graph, pair_level
+from scanweld.app.model_files import PairEntry
+from scanweld.app.model_folder import ModelFolder
 from scanweld.app.summary import verdict_sentence
 from scanweld.config import Config
 from scanweld.io import natural_key
@@ -88,7 +89,7 @@ def report_page(model: ModelFolder, sources: Sources | None, config: Config) -> 
         script_json=_script_json,
         count_of=len,
         plain=lambda value: json.dumps(value, ensure_ascii=False),
-        level=score_level,
+        level=pair_level,
     )
     return environment.get_template("report.html").render(
         defined=DEFINITIONS,
@@ -137,17 +138,17 @@ def _outcome(model: ModelFolder) -> dict[str, Any]:
     placed = [name for name in names if name in poses.poses]
     sentence = verdict_sentence(report.verdict, len(names), len(placed), len(poses.components))
     of = lambda kind: [name for name in names if report.scans[name].verdict is kind]  # noqa: E731
-    has_confidence = any(scan.confidence is not None for scan in report.scans.values())
     return {
         "verdict": report.verdict.value,
         "sentence": sentence[0].upper() + sentence[1:] + ".",
         "reasons": report.reasons,
+        "knowledge": report.knowledge,
         "scans": {name: report.scans[name] for name in names},
         "placed": placed,
         "doubtful": of(ScanVerdict.DOUBTFUL),
         "unplaced": of(ScanVerdict.UNPLACED),
         "components": poses.components,
-        "has_confidence": has_confidence,
+        "scans_have_confidence": any(scan.confidence is not None for scan in report.scans.values()),
         "seconds": sum(stage.seconds for stage in report.stages.values()),
         "peak_mb": max((stage.peak_mb for stage in report.stages.values()), default=None),
         "most_seconds": max((stage.seconds for stage in report.stages.values()), default=0) or 1,
@@ -169,6 +170,7 @@ def _graph(model: ModelFolder, looks: Mapping[str, ScanLook]) -> dict[str, Any]:
         "pairs": pairs,
         "cells": cells,
         "pair_words": [pair_words(pair) for pair in pairs],
+        "pairs_have_confidence": any(pair.confidence is not None for pair in pairs),
         "num_accepted": sum(pair.accepted for pair in pairs),
         "pair_data": [pair.model_dump(mode="json") for pair in pairs],
     }
@@ -177,7 +179,8 @@ def _graph(model: ModelFolder, looks: Mapping[str, ScanLook]) -> dict[str, Any]:
 def pair_words(pair: PairEntry) -> str:
     """A pair in a few lines, for its tip."""
     lines = [f"{pair.i} – {pair.j}: {'accepted' if pair.accepted else 'not accepted'}"]
-    told = [f"alone: {pair.kind.value}", f"score {numbers.score(pair.score)}"]
+    kind = f"{pair.kind.value} ({pair.sliding})" if pair.sliding else pair.kind.value
+    told = [f"alone: {kind}", f"score {numbers.score(pair.score)}"]
     told += [f"overlap {numbers.share(pair.overlap)}", f"margin {numbers.score(pair.margin)}"]
     if pair.confidence is not None:
         told.append(f"confidence {numbers.score(pair.confidence)}")

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from scanweld.app.html_report.model_folder import ModelFolder
+from scanweld.app.model_folder import ModelFolder
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray

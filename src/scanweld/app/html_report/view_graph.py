@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanweld.app.html_report.model_folder import PairEntry
+from scanweld.app.model_files import PairEntry
 from scanweld.pairs.result import PairKind
 
 SIZE = 420.0
 RADIUS = 158.0
 LEVELS = 5
-"""Steps of score that are drawn differently."""
+"""Steps of strength that are drawn differently."""
 FULL_SCORE = 0.6
-"""Score from which a pair is drawn strongest."""
+"""Score from which a pair without a confidence is drawn strongest."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -31,7 +31,7 @@ class Node:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Link:
-    """A pair as a line; ``level`` 0 to 4 for its score, or None where it was good but refused."""
+    """A pair as a line; ``level`` 0 to 4 for its strength, None where it was good but refused."""
 
     pair: PairEntry
     x1: float
@@ -70,10 +70,10 @@ def draw_graph(
     return GraphDrawing(nodes=nodes, links=tuple(links), is_dense=len(places) > 24)
 
 
-def score_level(score: float | None) -> int:
-    """The step, 0 to 4, at which a score is drawn."""
-    share = 0.0 if score is None else score / FULL_SCORE
-    return int(np.clip(np.floor(share * LEVELS), 0, LEVELS - 1))
+def pair_level(pair: PairEntry) -> int:
+    """The step, 0 to 4, at which a pair is drawn: by its confidence, or else by its score."""
+    strength = (pair.score or 0.0) / FULL_SCORE if pair.confidence is None else pair.confidence
+    return int(np.clip(np.floor(strength * LEVELS), 0, LEVELS - 1))
 
 
 def round_order(names: Sequence[str], accepted: Sequence[PairEntry]) -> list[str]:
@@ -137,6 +137,6 @@ def _node(name: str, angle: float, is_turned: bool) -> Node:
 def _link(pair: PairEntry, places: Mapping[str, float], thinner: float) -> Link:
     x1, y1 = _point(places[pair.i], RADIUS)
     x2, y2 = _point(places[pair.j], RADIUS)
-    level = score_level(pair.score) if pair.accepted else None
+    level = pair_level(pair) if pair.accepted else None
     width = 1.2 if level is None else 0.8 + 0.9 * level
     return Link(pair=pair, x1=x1, y1=y1, x2=x2, y2=y2, level=level, width=round(width * thinner, 2))

@@ -53,8 +53,9 @@ const percent = (value) => `${(100 * value).toFixed(1)} %`;
 
 function pairDetail(pair) {
   const shown = (value, digits) => (value === null ? "–" : value.toPrecision(digits));
+  const kind = pair.kind + (pair.sliding === null ? "" : ` (${pair.sliding})`);
   const lines = [
-    `${pair.i} – ${pair.j}: ${pair.accepted ? "accepted" : "not accepted"} (alone: ${pair.kind})`,
+    `${pair.i} – ${pair.j}: ${pair.accepted ? "accepted" : "not accepted"}; alone: ${kind}`,
     `score ${shown(pair.score, 3)}, overlap ${percent(pair.overlap)}, margin ${shown(pair.margin, 3)}, observability ${shown(pair.observability, 2)}`
       + (pair.confidence === null ? "" : `, confidence ${percent(pair.confidence)}`),
   ];
