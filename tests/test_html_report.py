@@ -19,19 +19,24 @@ from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
 from scanweld.app.html_report.page import scan_looks
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
+from scanweld.app.html_report.sources import Sources
 from scanweld.app.html_report.surface_check import check_surface, open_borders, thin_share
 from scanweld.app.html_report.view_graph import draw_graph, pair_level, round_order
 from scanweld.app.model_files import PairEntry
+from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
+from scanweld.config import PrepareConfig
 from scanweld.errors import InputError, ReadError
 from scanweld.evaluation.primitives import sphere
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.io import write_scan_ply
 from scanweld.pairs.result import PairKind
 from scanweld.pairs.slippage import Slide
+from scanweld.prepare.support import find_support
 from scanweld.reconstruction import FactReport, FactVerdict
 from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
 from tests.results import a_pair, a_result, no_pair
+from tests.test_support import on_table, seen
 
 VOID = {"meta", "link", "img", "br", "input", "hr", "col"}
 
@@ -156,6 +161,20 @@ def test_true_scans_lie_on_the_model(made: Made, page: Page):
     assert repr(found.median) in page.values()
     seen = check.support[check.support > 0]
     assert check.support.max() <= 4 and 1 <= np.median(seen) <= 2  # of four views from around
+
+
+@pytest.mark.parametrize("left_out", [True, False])
+def test_a_table_that_was_left_out_is_not_measured(tmp_path: Path, left_out: bool):
+    scan = seen(on_table(), 0.0)
+    result = a_result([scan.name])
+    told = dataclasses.replace(result.scans[scan.name], is_without_support=left_out)
+    folder = written(tmp_path, dataclasses.replace(result, scans={scan.name: told}))
+    sources = Sources(open_model(folder), {scan.name: scan}, PrepareConfig())
+    points = sources.points_of_model()[scan.name]
+    assert (len(points) == len(scan.points)) is not left_out
+    spacing = sources.prepared(scan.name).resolution
+    assert (find_support(points, spacing) is None) is left_out
+    assert sources.prepared(scan.name).is_without_support is left_out
 
 
 def test_residual_and_support_of_a_ball_measured_too_large():

@@ -47,6 +47,7 @@ class ScanEntry(Entry):
     edges: tuple[str, ...]
     overlap: float | None
     rms: float | None
+    is_without_support: bool = False
     confidence: float | None = None
 
 

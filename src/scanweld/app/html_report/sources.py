@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from scanweld.app.model_folder import ModelFolder
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
@@ -30,11 +32,12 @@ class Sources:
         self, model: ModelFolder, scans: Mapping[str, RangeScan], config: PrepareConfig
     ) -> None:
         self._poses = model.poses
+        self._entries = model.report.scans
         self._config = config
         self._prepared: dict[str, PreparedScan] = {}
         names = sorted(model.poses.poses, key=natural_key)
         for name in names:
-            known = model.report.scans[name].content_hash
+            known = self._entries[name].content_hash
             if name not in scans:
                 raise InputError(f"{name}: has a pose but is not among the scans given; add it")
             if known is not None and scans[name].content_hash() != known:
@@ -46,7 +49,7 @@ class Sources:
     def points_of_model(self) -> dict[str, FloatArray]:
         """Points (N, 3) of each scan of the largest component, in the model's frame."""
         names = sorted(self._poses.components[0], key=natural_key)
-        return {name: self.world_from_scan(name).apply(self._scans[name].points) for name in names}
+        return {name: self.world_from_scan(name).apply(self._points(name)) for name in names}
 
     def world_from_scan(self, name: str) -> Pose:
         """The pose of a placed scan, in the frame of its component."""
@@ -60,5 +63,15 @@ class Sources:
     def prepared(self, name: str) -> PreparedScan:
         """A scan as the run prepared it."""
         if name not in self._prepared:
-            self._prepared[name] = prepare(self._scans[name], self._config)
+            without_support = self._entries[name].is_without_support
+            self._prepared[name] = prepare(
+                self._scans[name], self._config, without_support=without_support
+            )
         return self._prepared[name]
+
+    def _points(self, name: str) -> FloatArray:
+        """Points (N, 3) of a scan in its frame, without the support where that was left out."""
+        if not self._entries[name].is_without_support:
+            return self._scans[name].points
+        scan = self.prepared(name)
+        return scan.scan_from_sensor.apply(scan.image.points()[np.isfinite(scan.image.depth)])
