@@ -25,7 +25,7 @@ from scanweld.app.html_report.view_graph import draw_graph, pair_level, round_or
 from scanweld.app.model_files import PairEntry
 from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
-from scanweld.config import PrepareConfig
+from scanweld.config import Config, FusionConfig, PrepareConfig
 from scanweld.errors import InputError, ReadError
 from scanweld.evaluation.primitives import sphere
 from scanweld.geometry.mesh import TriangleMesh, face_normals
@@ -33,7 +33,7 @@ from scanweld.io import write_scan_ply
 from scanweld.pairs.result import PairKind
 from scanweld.pairs.slippage import Slide
 from scanweld.prepare.support import find_support
-from scanweld.reconstruction import FactReport, FactVerdict
+from scanweld.reconstruction import FactReport, FactVerdict, ScanVerdict
 from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
 from tests.results import a_pair, a_result, no_pair
 from tests.test_support import on_table, seen
@@ -175,6 +175,21 @@ def test_a_table_that_was_left_out_is_not_measured(tmp_path: Path, left_out: boo
     spacing = sources.prepared(scan.name).resolution
     assert (find_support(points, spacing) is None) is left_out
     assert sources.prepared(scan.name).is_without_support is left_out
+
+
+@pytest.mark.parametrize("with_doubtful", [False, True])
+def test_residuals_are_of_the_scans_that_the_model_was_made_of(tmp_path: Path, with_doubtful: bool):
+    scene = small_scene()
+    result = good_result(scene)
+    config = Config(fusion=FusionConfig(with_doubtful=with_doubtful))
+    doubtful = dataclasses.replace(result.scans["scan_02"], verdict=ScanVerdict.DOUBTFUL)
+    scans = {**result.scans, "scan_02": doubtful}
+    folder = written(tmp_path, dataclasses.replace(result, scans=scans, config=config))
+    write_html_report(folder, {scan.name: scan for scan in scene.scans})
+    page = page_of(folder)
+    shown = [found for _, found in page.elements if "data-scan" in found]
+    assert len(shown) == (4 if with_doubtful else 3)
+    assert any(f"The fused surface of {len(shown)} scans" in words for words in page.words)
 
 
 def test_residual_and_support_of_a_ball_measured_too_large():

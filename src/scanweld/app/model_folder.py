@@ -11,6 +11,7 @@ from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.io import PoseSet, collect, read_mesh, read_poses
 from scanweld.io.pose_formats.records import printed
+from scanweld.reconstruction import ScanVerdict
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,6 +57,16 @@ class ModelFolder:
             ReadError: If it is missing or broken.
         """
         return read_entries(self.path / "graph.json", Graph)
+
+    @property
+    def fused_scans(self) -> list[str]:
+        """Scans that the mesh of a run was made of: doubtful ones if they were asked for."""
+        with_doubtful = self.report.settings.get("fusion", {}).get("with_doubtful", False)
+        return [
+            name
+            for name in (self.poses.components or ((),))[0]
+            if with_doubtful or self.report.scans[name].verdict is not ScanVerdict.DOUBTFUL
+        ]
 
     @cached_property
     def unit(self) -> Unit | None:

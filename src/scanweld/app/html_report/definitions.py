@@ -17,7 +17,11 @@ def _defined(term: str, meaning: str) -> Definition:
 
 
 DEFINITIONS: Mapping[str, Definition] = {
-    "verdict": _defined("verdict", "good, doubtful or unplaced, and why"),
+    "verdict": _defined(
+        "verdict",
+        "good, doubtful (placed, but no part of the model without --with-doubtful) or unplaced, "
+        "and why",
+    ),
     "points": _defined("points", "finite points that were read, and others that were left out"),
     "resolution": _defined("resolution", "median distance from a point to its nearest neighbour"),
     "diameter": _defined(

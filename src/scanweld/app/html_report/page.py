@@ -208,6 +208,7 @@ def _surface(
         "model": {
             "vertices": len(mesh.vertices),
             "faces": len(mesh.faces),
+            "num_scans": len(model.fused_scans),
             "shown_faces": len(scene.mesh.faces),
             "sides": three_sides(scene.mesh, orientation),
             "borders": borders,

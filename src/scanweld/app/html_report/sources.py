@@ -33,6 +33,7 @@ class Sources:
     ) -> None:
         self._poses = model.poses
         self._entries = model.report.scans
+        self._fused = model.fused_scans
         self._config = config
         self._prepared: dict[str, PreparedScan] = {}
         names = sorted(model.poses.poses, key=natural_key)
@@ -47,8 +48,8 @@ class Sources:
         self._scans = {name: scans[name] for name in names}
 
     def points_of_model(self) -> dict[str, FloatArray]:
-        """Points (N, 3) of each scan of the largest component, in the model's frame."""
-        names = sorted(self._poses.components[0], key=natural_key)
+        """Points (N, 3) of each scan that the model was made of, in its frame."""
+        names = sorted(self._fused, key=natural_key)
         return {name: self.world_from_scan(name).apply(self._points(name)) for name in names}
 
     def world_from_scan(self, name: str) -> Pose:
