@@ -83,6 +83,7 @@ def test_run_writes_the_output_and_a_summary(scans: Path, capsys: pytest.Capture
         "graph.json",
         "model.ply",
         "poses.json",
+        "report.html",
         "report.json",
     ]
     assert not work_folder(Path("model")).exists()

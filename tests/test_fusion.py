@@ -12,7 +12,6 @@ import pytest
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.primitives import plate, sphere
-from scanweld.evaluation.render import render_shaded, side_by_side, write_png
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
@@ -23,6 +22,7 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.shading import render_shaded, side_by_side, write_png
 from scanweld.prepare import prepare
 
 RADIUS = 50.0

@@ -152,7 +152,7 @@ def test_summary_says_verdict_reasons_and_files(result: Reconstruction):
     lines = summary(result, Path("model")).splitlines()
     assert lines[0] == "partial: 3 of 5 scans are placed"
     assert "  unplaced a: empty" in lines and "  unplaced überzählig: of another object" in lines
-    assert lines[-1].startswith("  model: model.ply (3 vertices), poses.json")
+    assert lines[-1].startswith("  model: model.ply (3 vertices), report.html")
 
 
 def test_summary_of_several_components_names_them():

@@ -167,6 +167,7 @@ def _scan_report(
         edges=tuple(sorted(prepared[n].name for n in neighbours)),
         overlap=overlap,
         rms=graph.rms.get(k),
+        is_without_support=scan.is_without_support,
     )
 
 

@@ -54,6 +54,7 @@ class ScanReport:
         overlap: Largest share of its samples that agree with one other placed scan; None if
             unplaced.
         rms: Point-to-plane residual after the joint refinement, in the scans' unit.
+        is_without_support: Whether the plane that the object stands on was left out.
         confidence: Probability that it is placed rightly beside the others of its component; None
             if unplaced.
         grounds: What the confidence rests on, see docs/report.md.
@@ -73,6 +74,7 @@ class ScanReport:
     edges: tuple[str, ...] = ()
     overlap: float | None = None
     rms: float | None = None
+    is_without_support: bool = False
     confidence: float | None = None
     grounds: Mapping[str, float] = field(default_factory=dict)
 

@@ -16,9 +16,21 @@ import typer
 
 from scanweld.app.comparison import compare, comparison_table
 from scanweld.app.info import describe_scan
-from scanweld.app.job import run_job
+from scanweld.app.job import report_job, run_job
 from scanweld.app.memory import parse_size
+from scanweld.app.model_commands import export, fuse
 from scanweld.app.named_pairs import named_pairs, with_pairs_joined
+from scanweld.app.options import (
+    NOT_GOOD,
+    ConfigFile,
+    Force,
+    Inputs,
+    Output,
+    Quiet,
+    UnitOption,
+    Verbose,
+    Workers,
+)
 from scanweld.app.progress import reporting
 from scanweld.app.summary import summary
 from scanweld.app.workspace import work_folder
@@ -34,7 +46,6 @@ from scanweld.knowledge import Knowledge, read_knowledge
 
 ERROR = 1
 USAGE = 2
-NOT_GOOD = 3
 INTERRUPTED = 130
 
 app = typer.Typer(
@@ -59,24 +70,9 @@ class MethodName(StrEnum):
     PAPER = "paper"
 
 
-class LengthUnit(StrEnum):
-    """What the scans' coordinates are measured in."""
-
-    M = "m"
-    CM = "cm"
-    MM = "mm"
-    IN = "in"
-
-
-Inputs = Annotated[
-    list[str], typer.Argument(metavar="INPUTS...", help="Scan files, folders or glob patterns.")
-]
 Files = Annotated[
     list[str], typer.Argument(metavar="FILES...", help="Scan files, folders or glob patterns.")
 ]
-Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")]
-ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
 Memory = Annotated[
     str | None,
     typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
@@ -85,9 +81,6 @@ Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random
 WithDoubtful = Annotated[
     bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Warnings only, no progress.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log.")]
 MethodOption = Annotated[
     MethodName | None, typer.Option(help="robust (the default), or paper: as published.")
 ]
@@ -112,7 +105,6 @@ Apart = Annotated[
 TurntableFlag = Annotated[
     bool, typer.Option("--turntable", help="All scans turn about one, unknown axis.")
 ]
-UnitOption = Annotated[LengthUnit | None, typer.Option(help="Unit of the scans' coordinates.")]
 
 
 @app.command()
@@ -177,6 +169,17 @@ def run(
 
 
 @app.command()
+def report(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder that run has made.")],
+    scans: Annotated[
+        list[str], typer.Option(help="The scans, if they have been moved since.")
+    ] = [],  # noqa: B006
+) -> None:
+    """Write report.html of a finished model folder anew."""
+    typer.echo(report_job(model, scans))
+
+
+@app.command()
 def info(files: Files) -> None:
     """Show what was read from scan files, and what was assumed."""
     failed = False
@@ -229,6 +232,10 @@ def evaluate(
     errors = compare(estimate, truth, scans)
     typer.echo(comparison_table(errors))
     raise typer.Exit(0 if errors.count(Standing.RIGHT) == len(errors.scans) else NOT_GOOD)
+
+
+app.command()(fuse)
+app.command()(export)
 
 
 def _print_error(error: ScanweldError) -> None:

@@ -1,15 +1,18 @@
-"""The main job: files to an output folder."""
+"""The main job, files to an output folder; and its report written anew."""
 
 import logging
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld import pipeline
+from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
+from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
-from scanweld.errors import ReadError
+from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.knowledge import Knowledge
@@ -67,11 +70,20 @@ def run_job(
             cache=workspace.cache,
             progress=progress,
         )
-        write_outputs(result, workspace.staging)
+        write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
+        write_html_report(workspace.staging, {scan.name: scan for scan in scans})
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
     return result
+
+
+def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:
+    """Where each scan's file is, by the scan's name, as seen from a folder."""
+    return {
+        file.name: printable(Path(os.path.relpath(os.path.abspath(file.path), folder)).as_posix())
+        for file in files
+    }
 
 
 def read_all(
@@ -89,3 +101,29 @@ def read_all(
             unreadable[file.name] = printable(str(error))
     progress("read", len(files), len(files))
     return scans, unreadable
+
+
+def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
+    """Write report.html of a finished model folder anew: ``scanweld report``.
+
+    Args:
+        folder: What ``scanweld run`` made.
+        inputs: The scans it was made of, where they are no longer where the report says. Where
+            they are not found at all, the page goes without what only they can tell.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        ScanweldError: If the folder is not whole, or the scans are not those of the run.
+    """
+    model = open_model(Path(folder))
+    try:
+        files = model.scan_files(model.poses.poses, inputs)
+    except InputError as error:
+        if inputs:
+            raise
+        logger.warning("%s; without them there are no residuals, support and contours", error)
+        return write_html_report(model.path)
+    scans = {name: read_scan(path, name) for name, path in files.items()}
+    return write_html_report(model.path, scans)
