@@ -13,7 +13,7 @@ from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io.atomic import write_whole
 from scanweld.io.ply import CAMERA_KEY, POSE_KEY
 
-_TYPE_NAMES = {"<f4": "float", "<f8": "double", "|u1": "uchar"}
+_TYPE_NAMES = {"<f4": "float", "<f8": "double", "|u1": "uchar", "<i4": "int"}
 
 
 def write_scan_ply(path: Path | str, scan: RangeScan) -> None:
@@ -45,13 +45,21 @@ def write_scan_ply(path: Path | str, scan: RangeScan) -> None:
 
 
 def write_mesh_ply(path: Path | str, mesh: TriangleMesh) -> None:
-    """Write a mesh with its normals, rounded to single precision, and its colours.
+    """Write a mesh with its normals, rounded to single precision, its colours, and what is known.
+
+    The properties ``support``, ``stdev`` and ``filled`` are as in the mesh.
 
     Raises:
         WriteError: If the file cannot be written.
     """
     normals = None if mesh.normals is None else mesh.normals.astype(np.float32)
     vertex = _vertex_fields(mesh.vertices, normals, mesh.colors)
+    if mesh.support is not None:
+        vertex["support"] = mesh.support.astype("<i4")
+    if mesh.stdev is not None:
+        vertex["stdev"] = mesh.stdev.astype("<f4")
+    if mesh.filled is not None:
+        vertex["filled"] = mesh.filled.astype("|u1")
     elements = [_scalar_element("vertex", vertex), _face_element(mesh.faces)]
     write_whole(Path(path), _file([], elements))
 
