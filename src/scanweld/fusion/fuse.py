@@ -22,7 +22,7 @@ from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_imag
 from scanweld.fusion.sheets import second_sheets
 from scanweld.fusion.support import measure_support
 from scanweld.fusion.surface import extract_surface, vertex_flags
-from scanweld.fusion.volume import Volume, integrate
+from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
@@ -36,10 +36,6 @@ _MIN_PIXELS = 10
 """Surface pixels of all scans together, at least."""
 _FINE_SHARE = 0.25
 """Voxels are as fine as this share of the scans: coarser ones must not blur what these saw."""
-_DEPTH_VOXELS = 1.5
-_DEPTH_SIGMAS = 3.0
-"""Weights fall to nothing this far behind a surface, where the other side of a wall may be."""
-
 _PINHOLE_VOXELS = 12.0
 """Holes with so short a border come from single cells, whose corners no scan measured all."""
 _FILLED_ROUNDS = 20
@@ -76,7 +72,7 @@ def fuse(
     if len(scans) != len(world_from_sensor):
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
     images, voxel = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), workers)
-    depth = max(_DEPTH_VOXELS * voxel, _DEPTH_SIGMAS * max(image.noise for image in images))
+    depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
     truncation = max(config.truncation_voxels * voxel, 2.0 * depth)
     volume = integrate(images, voxel, truncation, depth, workers)
     logger.debug("%d blocks of voxels of %.4g", len(volume.blocks), voxel)

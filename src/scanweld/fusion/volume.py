@@ -24,6 +24,9 @@ _CARVE_RATIO = 1.0
 """A voxel is empty where free space weighs more than this share of its surface's weight."""
 _MARGIN_BLOCKS = 8
 """Coordinates that stay free below the lowest block: holes may be closed there."""
+DEPTH_VOXELS = 1.5
+DEPTH_SIGMAS = 3.0
+"""Weights fall to nothing this far behind a surface, where the other side of a wall may be."""
 _PINHOLE_ROUNDS = 2
 _MIN_DEEP_VOXELS = 0.7
 """Voxels so far behind the surface are deep inside."""
