@@ -219,6 +219,8 @@ def fuse_largest(
                 [prepared[k] for k in order],
                 [world_from_reference @ component.poses[k] for k in order],
                 config.fusion,
+                prepare=config.prepare,
+                workers=stages.workers,
             )
         except InputError as error:
             logger.warning("no model: %s", error)

@@ -15,6 +15,14 @@ from typing import Annotated
 import typer
 
 from scanweld.app.comparison import compare, comparison_table
+from scanweld.app.fusion_options import (
+    ComponentOption,
+    FacesOption,
+    HolesOption,
+    SmoothOption,
+    WatertightOption,
+    fusion_settings,
+)
 from scanweld.app.info import describe_scan
 from scanweld.app.job import report_job, run_job
 from scanweld.app.memory import parse_size
@@ -124,6 +132,11 @@ def run(
     apart: Apart = None,
     turntable: TurntableFlag = False,
     with_doubtful: WithDoubtful = False,
+    holes: HolesOption = None,
+    component: ComponentOption = None,
+    watertight: WatertightOption = False,
+    smooth: SmoothOption = None,
+    faces: FacesOption = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -134,10 +147,11 @@ def run(
         seed=seed,
         unit=None if unit is None else unit.value,
         method=None if method is None else method.value,
+        fusion={
+            **fusion_settings(holes, component, watertight, smooth, faces),
+            "with_doubtful": with_doubtful or None,
+        },
     )
-    if with_doubtful:
-        fusion = settings.fusion.model_copy(update={"with_doubtful": True})
-        settings = settings.model_copy(update={"fusion": fusion})
     known = Knowledge(
         fix=tuple(fix or ()),
         start=None if start is None else read_poses(start),

@@ -89,7 +89,13 @@ def _fuse(
 ) -> Fused:
     world_from_sensor = [_sensor_pose(scan, known[scan.name], found) for scan in intake.prepared]
     with stages.stage("fuse") as counts:
-        mesh = fuse(intake.prepared, world_from_sensor, config.fusion)
+        mesh = fuse(
+            intake.prepared,
+            world_from_sensor,
+            config.fusion,
+            prepare=config.prepare,
+            workers=stages.workers,
+        )
         counts["faces"] = len(mesh.faces)
     pairs = zip(intake.prepared, world_from_sensor, strict=True)
     poses = {scan.name: pose @ scan.scan_from_sensor.inverse() for scan, pose in pairs}

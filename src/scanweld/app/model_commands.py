@@ -9,6 +9,14 @@ import typer
 from scanweld.app.export import Wanted
 from scanweld.app.export import export as export_model
 from scanweld.app.fuse import Fused, fuse_job
+from scanweld.app.fusion_options import (
+    ComponentOption,
+    FacesOption,
+    HolesOption,
+    SmoothOption,
+    WatertightOption,
+    fusion_settings,
+)
 from scanweld.app.options import (
     NOT_GOOD,
     ConfigFile,
@@ -70,12 +78,21 @@ def fuse(
     config: ConfigFile = None,
     workers: Workers = None,
     unit: UnitOption = None,
+    holes: HolesOption = None,
+    component: ComponentOption = None,
+    watertight: WatertightOption = False,
+    smooth: SmoothOption = None,
+    faces: FacesOption = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
-    settings = load_config(config, unit=None if unit is None else unit.value)
+    settings = load_config(
+        config,
+        unit=None if unit is None else unit.value,
+        fusion=fusion_settings(holes, component, watertight, smooth, faces),
+    )
     with reporting(quiet=quiet, verbose=verbose) as progress:
         fused = fuse_job(
             inputs, poses, output, settings, workers=workers, force=force, progress=progress

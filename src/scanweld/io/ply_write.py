@@ -46,13 +46,21 @@ def write_scan_ply(path: Path | str, scan: RangeScan) -> None:
 
 
 def write_mesh_ply(path: Path | str, mesh: TriangleMesh) -> None:
-    """Write a mesh with its normals, rounded to single precision, and its colours.
+    """Write a mesh with its normals, rounded to single precision, its colours, and what is known.
+
+    The properties ``support``, ``stdev`` and ``filled`` are as in the mesh.
 
     Raises:
         WriteError: If the file cannot be written.
     """
     normals = None if mesh.normals is None else mesh.normals.astype(np.float32)
     vertex = _vertex_fields(mesh.vertices, normals, mesh.colors)
+    if mesh.support is not None:
+        vertex["support"] = mesh.support.astype("<i4")
+    if mesh.stdev is not None:
+        vertex["stdev"] = mesh.stdev.astype("<f4")
+    if mesh.filled is not None:
+        vertex["filled"] = mesh.filled.astype("|u1")
     elements = [_scalar_element("vertex", vertex), _face_element(mesh.faces)]
     write_whole(Path(path), _file([], elements))
 

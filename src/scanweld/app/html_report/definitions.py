@@ -22,7 +22,11 @@ DEFINITIONS: Mapping[str, Definition] = {
         "good, doubtful (placed, but no part of the model without --with-doubtful) or unplaced, "
         "and why",
     ),
-    "points": _defined("points", "finite points that were read, and others that were left out"),
+    "points": _defined(
+        "points",
+        "finite points that were read (and kept, where the scan was thinned), and others that "
+        "were left out",
+    ),
     "resolution": _defined("resolution", "median distance from a point to its nearest neighbour"),
     "diameter": _defined(
         "diameter",
