@@ -321,12 +321,17 @@ def test_known_poses_are_fused_in_their_frame(
     assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
     poses = model / form if form == "poses.json" else Path("out") / form
     assert scanweld("fuse", "scans", "--poses", poses, "-o", "fused", "-q", "--unit", "mm") == 0
-    assert "4 of 4 scans fused" in capsys.readouterr().out
+    assert "given: all 4 scans are fused" in capsys.readouterr().out
     assert distance_to_truth(scene, read_mesh("fused/model.ply")) < 0.02
     found = read_poses("fused/poses.json").poses
     for name, pose in scene.world_from_scan.items():
         assert np.abs(found[name].matrix() - pose.matrix()).max() < 1e-9
-    # What fuse makes is a model like any other.
+    # What fuse makes is a model like any other, but that it says nothing of pairs.
+    page = Path("fused/report.html").read_text(encoding="utf-8")
+    assert "All 4 scans are fused with the poses that were given." in page
+    assert 'id="residuals"' in page and 'id="graph"' not in page and 'id="contours"' not in page
+    assert scanweld("report", "fused") == 0
+    assert Path("fused/report.html").read_text(encoding="utf-8") == page
     assert scanweld("export", "fused", "--poses", "conf", "--model", "glb", "-o", "again") == 0
     assert Path("again/poses.conf").read_text() and "note" not in capsys.readouterr().out
 
@@ -337,7 +342,8 @@ def test_scans_without_a_pose_are_left_out_and_named(
     poses = {name: scene.world_from_scan[name].matrix().tolist() for name in NAMES[:3]}
     Path("some.json").write_text(json.dumps(poses))
     assert scanweld("fuse", "scans", "--poses", "some.json", "-o", "fused", "-q") == 3
-    assert "left out scan_04: no pose in some.json" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "partial: 3 of 4 scans" in told and "unplaced scan_04: no pose in some.json" in told
     assert read_poses("fused/poses.json").unplaced == {"scan_04": "no pose in some.json"}
     assert set(read_poses("fused/poses.json").poses) == set(NAMES[:3])
 

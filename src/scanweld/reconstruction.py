@@ -19,11 +19,12 @@ class Verdict(StrEnum):
     PARTIAL = "partial"
     DOUBTFUL = "doubtful"
     NOTHING = "nothing"
+    GIVEN = "given"
 
     @property
     def exit_code(self) -> int:
-        """0 for good, else 3."""
-        return 0 if self is Verdict.GOOD else 3
+        """0 for good, and where all poses were given; else 3."""
+        return 0 if self in (Verdict.GOOD, Verdict.GIVEN) else 3
 
 
 class ScanVerdict(StrEnum):
@@ -32,6 +33,7 @@ class ScanVerdict(StrEnum):
     GOOD = "good"
     DOUBTFUL = "doubtful"
     UNPLACED = "unplaced"
+    GIVEN = "given"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -39,7 +41,7 @@ class ScanReport:
     """What became of one scan.
 
     Attributes:
-        verdict: Good, doubtful or unplaced.
+        verdict: Good, doubtful or unplaced; given if its pose was, and is not judged.
         reason: Why, in a sentence.
         num_points: Finite points read; 0 if the scan could not be read.
         num_dropped: NaN and infinite points left out.

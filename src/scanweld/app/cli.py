@@ -184,7 +184,9 @@ def run(
 
 @app.command()
 def report(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder that run has made.")],
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="Folder that run or fuse has made.")
+    ],
     scans: Annotated[
         list[str], typer.Option(help="The scans, if they have been moved since.")
     ] = [],  # noqa: B006

@@ -70,7 +70,8 @@ def run_job(
             cache=workspace.cache,
             progress=progress,
         )
-        write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
+        places = relative_paths(files, workspace.output)
+        write_outputs(result, workspace.staging, places, max_points)
         write_html_report(workspace.staging, {scan.name: scan for scan in scans})
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
@@ -107,7 +108,7 @@ def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
     """Write report.html of a finished model folder anew: ``scanweld report``.
 
     Args:
-        folder: What ``scanweld run`` made.
+        folder: What ``scanweld run`` or ``fuse`` made.
         inputs: The scans it was made of, where they are no longer where the report says. Where
             they are not found at all, the page goes without what only they can tell.
 
@@ -125,5 +126,4 @@ def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
             raise
         logger.warning("%s; without them there are no residuals, support and contours", error)
         return write_html_report(model.path)
-    scans = {name: read_scan(path, name) for name, path in files.items()}
-    return write_html_report(model.path, scans)
+    return write_html_report(model.path, model.read_scans(files))

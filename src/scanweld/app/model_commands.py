@@ -8,7 +8,7 @@ import typer
 
 from scanweld.app.export import Wanted
 from scanweld.app.export import export as export_model
-from scanweld.app.fuse import Fused, fuse_job
+from scanweld.app.fuse import fuse_job
 from scanweld.app.fusion_options import (
     ComponentOption,
     FacesOption,
@@ -18,7 +18,6 @@ from scanweld.app.fusion_options import (
     fusion_settings,
 )
 from scanweld.app.options import (
-    NOT_GOOD,
     ConfigFile,
     Force,
     Inputs,
@@ -29,8 +28,8 @@ from scanweld.app.options import (
     Workers,
 )
 from scanweld.app.progress import reporting
+from scanweld.app.summary import summary
 from scanweld.config import load_config
-from scanweld.io import natural_key
 
 
 class PoseFormatName(StrEnum):
@@ -94,11 +93,11 @@ def fuse(
         fusion=fusion_settings(holes, component, watertight, smooth, faces),
     )
     with reporting(quiet=quiet, verbose=verbose) as progress:
-        fused = fuse_job(
+        result = fuse_job(
             inputs, poses, output, settings, workers=workers, force=force, progress=progress
         )
-    typer.echo(_summary(fused, output))
-    raise typer.Exit(NOT_GOOD if fused.left_out else 0)
+    typer.echo(summary(result, output))
+    raise typer.Exit(result.verdict.exit_code)
 
 
 def export(
@@ -130,11 +129,3 @@ def export(
     )
     lines = export_model(model_dir, output, wanted, scans=scans, force=force)
     typer.echo("\n".join(lines))
-
-
-def _summary(fused: Fused, output: Path) -> str:
-    total = len(fused.poses) + len(fused.left_out)
-    lines = [f"{len(fused.poses)} of {total} scans fused into {len(fused.mesh.faces):,} faces"]
-    for name in sorted(fused.left_out, key=natural_key):
-        lines.append(f"  left out {name}: {fused.left_out[name]}")
-    return "\n".join([*lines, f"  {output}: model.ply, poses.json, report.json, config.toml"])

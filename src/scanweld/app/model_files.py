@@ -25,9 +25,10 @@ class FileEntry(Entry):
 
 
 class Files(Entry):
-    """What report.json says of every model's scans, whoever made it."""
+    """What report.json says of where the scans are, and how they were read."""
 
     scans: dict[str, FileEntry]
+    max_points: int | None = None
 
 
 class ScanEntry(Entry):
@@ -65,7 +66,7 @@ class StageEntry(Entry):
 
 
 class Report(Entry):
-    """report.json of a run."""
+    """report.json."""
 
     format: Literal[1]
     verdict: Verdict
@@ -110,7 +111,7 @@ def read_entries(path: Path, kind: type[Content]) -> Content:
         ReadError: If it is missing, broken, or does not say what it should.
     """
     if not path.is_file():
-        raise ReadError(f"{path}: is missing; name a folder that scanweld run has made")
+        raise ReadError(f"{path}: is missing; name a folder that scanweld run or fuse has made")
     content = load_json(path, read_text(path))
     try:
         return kind.model_validate(content)

@@ -9,8 +9,10 @@ from scanweld.app.model_files import Files, Graph, Report, read_entries
 from scanweld.config import Unit, load_config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.io import PoseSet, collect, read_mesh, read_poses
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
 from scanweld.io.pose_formats.records import printed
+from scanweld.prepare.thinning import thinned
 from scanweld.reconstruction import ScanVerdict
 
 
@@ -42,16 +44,16 @@ class ModelFolder:
 
     @cached_property
     def report(self) -> Report:
-        """What a run reports.
+        """What was made of the scans.
 
         Raises:
-            ReadError: If it is missing or broken, or no run has made the folder.
+            ReadError: If it is missing or broken.
         """
         return read_entries(self.path / "report.json", Report)
 
     @cached_property
     def graph(self) -> Graph:
-        """All pairs of a run.
+        """All pairs; none where the poses were given.
 
         Raises:
             ReadError: If it is missing or broken.
@@ -100,11 +102,28 @@ class ModelFolder:
                 )
         return {name: found[name] for name in names}
 
-    def _told_files(self) -> Mapping[str, Path]:
+    def read_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+        """Scans as the model's maker took them: thinned where it had to save memory.
+
+        Args:
+            files: As ``scan_files`` finds them, by the scans' names.
+
+        Raises:
+            ReadError: If one of them, or the report, is broken.
+        """
+        most = self._files.max_points
+        return {
+            name: read_scan(path, name) if most is None else thinned(read_scan(path, name), most)
+            for name, path in files.items()
+        }
+
+    @cached_property
+    def _files(self) -> Files:
         report = self.path / "report.json"
-        if not report.is_file():
-            return {}
-        scans = read_entries(report, Files).scans
+        return read_entries(report, Files) if report.is_file() else Files(scans={})
+
+    def _told_files(self) -> Mapping[str, Path]:
+        scans = self._files.scans
         return {name: self.path / scan.file for name, scan in scans.items() if scan.file}
 
 

@@ -38,6 +38,8 @@ def verdict_sentence(verdict: Verdict, total: int, placed: int, pieces: int) -> 
     """The verdict in words, from the numbers of scans, of those placed, and of components."""
     if verdict is Verdict.NOTHING:
         return f"no two of the {total} scans could be brought together"
+    if verdict is Verdict.GIVEN:
+        return f"all {total} scans are fused with the poses that were given"
     share = f"all {total} scans are" if placed == total else f"{placed} of {total} scans are"
     return f"{share} placed" + (f", in {pieces} separate components" if pieces > 1 else "")
 

@@ -19,8 +19,8 @@ def _defined(term: str, meaning: str) -> Definition:
 DEFINITIONS: Mapping[str, Definition] = {
     "verdict": _defined(
         "verdict",
-        "good, doubtful (placed, but no part of the model without --with-doubtful) or unplaced, "
-        "and why",
+        "good, doubtful (placed, but no part of the model without --with-doubtful), unplaced, or "
+        "given (its pose was given, and is not judged), and why",
     ),
     "points": _defined(
         "points",

@@ -171,6 +171,7 @@ def _graph(model: ModelFolder, looks: Mapping[str, ScanLook]) -> dict[str, Any]:
         "cells": cells,
         "pair_words": [pair_words(pair) for pair in pairs],
         "pairs_have_confidence": any(pair.confidence is not None for pair in pairs),
+        "has_pairs": bool(pairs),
         "num_accepted": sum(pair.accepted for pair in pairs),
         "pair_data": [pair.model_dump(mode="json") for pair in pairs],
     }

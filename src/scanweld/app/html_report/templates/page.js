@@ -64,14 +64,14 @@ function pairDetail(pair) {
   return lines.join("\n");
 }
 
-const cells = [...matrix.querySelectorAll("td[data-pair]")];
+const cells = matrix ? [...matrix.querySelectorAll("td[data-pair]")] : [];
 if (cells.length) cells[0].tabIndex = 0;
 for (const cell of cells) {
   const tell = () => { detail.textContent = pairDetail(pairs[cell.dataset.pair]); };
   cell.addEventListener("pointerenter", tell);
   cell.addEventListener("focus", tell);
 }
-matrix.addEventListener("keydown", (event) => {
+matrix?.addEventListener("keydown", (event) => {
   const [rows, columns] = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[event.key] ?? [0, 0];
   const cell = event.target.closest("td");
   if (!cell || (!rows && !columns)) return;
