@@ -18,8 +18,10 @@ from scanweld.fusion.color import exposure_gains
 from scanweld.fusion.finish import close_pinholes, decimated, smoothed, split_fans
 from scanweld.fusion.noise import scan_noise
 from scanweld.fusion.posed_image import PosedImage, pose_image
+from scanweld.fusion.sheets import second_sheets, without_second_sheets
+from scanweld.fusion.support import Support
 from scanweld.geometry.camera import CameraModel
-from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals
+from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals, smoothed_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
@@ -177,6 +179,29 @@ def test_a_scan_a_little_off_makes_no_second_sheet():
     mesh = fuse(scans, [off @ poses[0], *poses[1:]], OPEN)
     found = surface_defects(mesh, scans[0].resolution)
     assert (found.non_manifold, found.double, found.cracks) == (0, 0, 0)
+
+
+def test_sheets_that_share_a_corner_are_two():
+    """By their corner all vertices are a few edges apart, as on one sheet with a step.
+
+    2 --- 2 --- 2
+      \\            seen from the side: three by three vertices each, by the scans behind them
+        1 --- 1
+    """
+    side = np.arange(3)
+    x, y = (part.ravel() for part in np.meshgrid(side, side))
+    corner = (x + 3 * y)[(x < 2) & (y < 2)]
+    squares = [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
+    sheet = np.concatenate([np.stack(part, axis=1) for part in squares])
+    plane = np.stack([x, y, np.zeros(9)], axis=1).astype(np.float64)
+    vertices = np.concatenate([plane, plane - [0.0, 0.0, 1.5]])
+    other = np.where(sheet == 0, 0, sheet + 9)
+    support = Support(count=np.repeat([2, 1], 9), stdev=np.full(18, 0.1))
+    faces = np.concatenate([sheet, other])
+    joined = smoothed_normals(vertices, faces, 1)
+    assert (second_sheets(vertices, faces, joined, 1.0) < 0).all()
+    kept, kept_faces = without_second_sheets(vertices, faces, support, 1.0)
+    assert len(kept_faces) == len(sheet) and (kept[kept_faces][..., 2] == 0.0).all()
 
 
 def test_defects_are_counted():

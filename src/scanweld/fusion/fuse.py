@@ -19,7 +19,7 @@ from scanweld.fusion.finish import (
 from scanweld.fusion.holes import closed_field
 from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
-from scanweld.fusion.sheets import second_sheets
+from scanweld.fusion.sheets import without_second_sheets
 from scanweld.fusion.support import measure_support
 from scanweld.fusion.surface import extract_surface, vertex_flags
 from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
@@ -128,7 +128,7 @@ def _surface(
         closing = "fill"
     if closing == "open":
         vertices, faces = extract_surface(volume)
-        faces = _seen_faces(vertices, faces, images, volume.voxel)
+        vertices, faces = _seen_part(vertices, faces, images, volume.voxel)
         filled = np.zeros(len(vertices), dtype=bool)
     else:
         field = closed_field(volume, images, closing, depth, workers)
@@ -144,23 +144,14 @@ def _surface(
     return smoothed(vertices, faces, _FILLED_ROUNDS, filled), faces, filled
 
 
-def _seen_faces(
+def _seen_part(
     vertices: FloatArray, faces: IntArray, images: Sequence[PosedImage], voxel: float
-) -> IntArray:
-    """The faces that were seen, without those between and beyond, and without second sheets.
-
-    Of two sheets the one goes that fewer scans support, or that is known worse.
-    """
+) -> tuple[FloatArray, IntArray]:
+    """What was seen of the surface, without what lies between and beyond, as a manifold."""
     normals = smoothed_normals(vertices, faces, _NORMAL_ROUNDS)
     support = measure_support(images, vertices, normals, voxel)
-    is_good = support.count > 0
-    other = second_sheets(vertices, faces, normals, voxel)
-    one = np.flatnonzero(is_good & (other >= 0) & is_good[other])
-    two = other[one]
-    fewer = support.count[one] - support.count[two]
-    goes = (fewer < 0) | ((fewer == 0) & (support.stdev[one] > support.stdev[two]))
-    is_good[np.where(goes, one, two)] = False
-    return faces[is_good[faces].all(axis=1)]
+    faces = faces[(support.count > 0)[faces].all(axis=1)]
+    return without_second_sheets(vertices, faces, support, voxel)
 
 
 def _dressed(

@@ -4,7 +4,10 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
+from scanweld.fusion.finish import split_fans
+from scanweld.fusion.support import Support
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.mesh import smoothed_normals
 
 _SAME_SIDE = 0.7
 """Cosine above which two sheets look the same way; the sides of a thin wall look apart."""
@@ -14,6 +17,47 @@ _MAX_EDGES = 5
 """Vertices that are no more edges apart are on one sheet."""
 _RADIUS_VOXELS = 0.75
 """Places on the normal are so far from a vertex of the other sheet, at most."""
+_MAX_PEELS = 8
+"""Rounds in which second sheets are taken off; two or three do."""
+_NORMAL_ROUNDS = 1
+"""Slivers among the triangles would turn the normals of their corners."""
+
+
+def without_second_sheets(
+    vertices: FloatArray, faces: IntArray, support: Support, voxel: float
+) -> tuple[FloatArray, IntArray]:
+    """The surface as a manifold on which nothing lies double.
+
+    Of two sheets the one goes that fewer scans support, or that is known worse. Sheets may hang
+    together by what has to go, or by a corner that they share, so that they are looked for after
+    such corners were split, and again until there are none.
+
+    Args:
+        vertices: (V, 3), about a voxel apart.
+        faces: (F, 3).
+        support: Of the vertices.
+        voxel: Edge of a voxel.
+
+    Returns:
+        Vertices (W, 3) and faces (G, 3).
+    """
+    index = np.arange(len(vertices))
+    for _ in range(_MAX_PEELS):
+        faces, parts = split_fans(faces)
+        index = index[parts]
+        points = vertices[index]
+        normals = smoothed_normals(points, faces, _NORMAL_ROUNDS)
+        other = second_sheets(points, faces, normals, voxel)
+        one = np.flatnonzero(other >= 0)
+        if not len(one):
+            break
+        two = other[one]
+        fewer = support.count[index[one]] - support.count[index[two]]
+        is_worse = support.stdev[index[one]] > support.stdev[index[two]]
+        goes = np.zeros(len(index), dtype=bool)
+        goes[np.where((fewer < 0) | ((fewer == 0) & is_worse), one, two)] = True
+        faces = faces[~goes[faces].any(axis=1)]
+    return vertices[index], faces
 
 
 def second_sheets(
