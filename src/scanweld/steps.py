@@ -26,6 +26,7 @@ from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
 from scanweld.pairs.result import Evidence, PairResult
 from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.progress import ScanRefused
 from scanweld.reconstruction import FactReport
 from scanweld.stages import Stages, work_key
 
@@ -134,6 +135,8 @@ def refine_placed(
         graph = replace(graph, doubts={**_scale_doubts(intake, graph), **doubts})
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
+    for k, reason in graph.unplaced.items():
+        stages.progress(ScanRefused(scan=intake.prepared[k].name, reason=reason))
     return graph
 
 

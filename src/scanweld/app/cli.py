@@ -25,6 +25,7 @@ from scanweld.app.fusion_options import (
 )
 from scanweld.app.info import describe_scan
 from scanweld.app.job import report_job, run_job
+from scanweld.app.json_lines import finished_line
 from scanweld.app.memory import parse_size
 from scanweld.app.model_commands import export, fuse
 from scanweld.app.named_pairs import named_pairs, with_pairs_joined
@@ -33,6 +34,7 @@ from scanweld.app.options import (
     ConfigFile,
     Force,
     Inputs,
+    Json,
     Output,
     Quiet,
     UnitOption,
@@ -138,6 +140,7 @@ def run(
     smooth: SmoothOption = None,
     faces: FacesOption = None,
     force: Force = False,
+    as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -162,7 +165,7 @@ def run(
     if knowledge is not None:
         known = read_knowledge(knowledge).joined(known)
     try:
-        with reporting(quiet=quiet, verbose=verbose) as progress:
+        with reporting(quiet=quiet, verbose=verbose, as_json=as_json) as progress:
             result = run_job(
                 inputs,
                 output,
@@ -178,7 +181,7 @@ def run(
         remark = f"the same command goes on from {kept}" if kept.exists() else "nothing was written"
         typer.echo(f"scanweld: interrupted; {remark}", err=True)
         raise typer.Exit(INTERRUPTED) from None
-    typer.echo(summary(result, output))
+    typer.echo(finished_line(result, output) if as_json else summary(result, output))
     raise typer.Exit(result.verdict.exit_code)
 
 

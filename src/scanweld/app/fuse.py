@@ -18,7 +18,7 @@ from scanweld.io.pose_formats.records import require_pinhole
 from scanweld.knowledge import Knowledge
 from scanweld.outcome import prepared_report, unplaced_report
 from scanweld.parallel import num_workers, single_threaded_algebra
-from scanweld.progress import NoCache, Progress, silent
+from scanweld.progress import NoCache, Progress, ScanRefused, silent, telling
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 from scanweld.stages import Stages
 
@@ -42,7 +42,7 @@ def fuse_job(
         config: Settings; the defaults if not given.
         workers: Threads; as many as there are cores if not given.
         force: Whether an output that is there already is replaced.
-        progress: Called with (stage, done, total).
+        progress: Told of stages, their finished items, and scans that are refused.
 
     Returns:
         The model and the poses in the world frame that was given; these are not judged.
@@ -62,11 +62,14 @@ def fuse_job(
         without = {
             file.name: f"no pose in {poses.name}" for file in files if file.name not in known
         }
+        for name, reason in without.items():
+            progress(ScanRefused(scan=name, reason=reason))
         with single_threaded_algebra():
             intake = take_in(scans, unreadable, Knowledge(), config, stages)
             result = _fuse(intake, known, found, without, config, stages)
         write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
-        write_html_report(workspace.staging, {scan.name: scan for scan in scans})
+        with telling(progress, "report"):
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
         workspace.publish()
     return result
 

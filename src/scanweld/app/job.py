@@ -18,7 +18,7 @@ from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.knowledge import Knowledge
 from scanweld.parallel import num_workers
 from scanweld.prepare.thinning import thinned
-from scanweld.progress import Progress, silent
+from scanweld.progress import Progress, ScanRefused, StageAdvanced, silent, telling
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import peak_memory_mb
 
@@ -47,7 +47,7 @@ def run_job(
         memory: Bytes that the run may take: large scans are thinned for it, and fewer are prepared
             at a time if need be. Any if None.
         force: Whether an output that is there already is replaced.
-        progress: Called with (stage, done, total).
+        progress: Told of stages, their finished items, and scans that are refused.
 
     Raises:
         ScanweldError: If there is too little to work on, or the output cannot be written. Files
@@ -72,7 +72,8 @@ def run_job(
         )
         places = relative_paths(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
-        write_html_report(workspace.staging, {scan.name: scan for scan in scans})
+        with telling(progress, "report"):
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
@@ -93,14 +94,16 @@ def read_all(
     """Scans of all files that can be read, thinned if need be; of the others, name -> reason."""
     scans: list[RangeScan] = []
     unreadable: dict[str, str] = {}
-    for done, file in enumerate(files):
-        progress("read", done, len(files))
-        try:
-            scan = read_scan(file.path, file.name)
-            scans.append(scan if max_points is None else thinned(scan, max_points))
-        except ReadError as error:
-            unreadable[file.name] = printable(str(error))
-    progress("read", len(files), len(files))
+    with telling(progress, "read") as counts:
+        for done, file in enumerate(files, start=1):
+            try:
+                scan = read_scan(file.path, file.name)
+                scans.append(scan if max_points is None else thinned(scan, max_points))
+            except ReadError as error:
+                unreadable[file.name] = printable(str(error))
+                progress(ScanRefused(scan=file.name, reason=unreadable[file.name]))
+            progress(StageAdvanced(stage="read", done=done, total=len(files)))
+        counts["scans"] = len(scans)
     return scans, unreadable
 
 

@@ -17,10 +17,12 @@ from scanweld.app.fusion_options import (
     WatertightOption,
     fusion_settings,
 )
+from scanweld.app.json_lines import finished_line
 from scanweld.app.options import (
     ConfigFile,
     Force,
     Inputs,
+    Json,
     Output,
     Quiet,
     UnitOption,
@@ -83,6 +85,7 @@ def fuse(
     smooth: SmoothOption = None,
     faces: FacesOption = None,
     force: Force = False,
+    as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -92,11 +95,11 @@ def fuse(
         unit=None if unit is None else unit.value,
         fusion=fusion_settings(holes, component, watertight, smooth, faces),
     )
-    with reporting(quiet=quiet, verbose=verbose) as progress:
+    with reporting(quiet=quiet, verbose=verbose, as_json=as_json) as progress:
         result = fuse_job(
             inputs, poses, output, settings, workers=workers, force=force, progress=progress
         )
-    typer.echo(summary(result, output))
+    typer.echo(finished_line(result, output) if as_json else summary(result, output))
     raise typer.Exit(result.verdict.exit_code)
 
 

@@ -27,5 +27,8 @@ ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a T
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Warnings only, no progress.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Tell of progress and the verdict as JSON, a line an event.")
+]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log.")]
 UnitOption = Annotated[LengthUnit | None, typer.Option(help="Unit of the scans' coordinates.")]
