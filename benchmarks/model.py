@@ -34,7 +34,7 @@ from scanweld.evaluation.simulate import simulate
 from scanweld.evaluation.surface_defects import surface_defects
 from scanweld.evaluation.surface_errors import sample_surface, surface_distances
 from scanweld.evaluation.surface_fit import fit_surface
-from scanweld.fusion import fuse
+from scanweld.fusion import fuse, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose
@@ -248,7 +248,7 @@ def _ours(subject: Subject, workers: int) -> TriangleMesh:
 
 
 def _voxel(subject: Subject) -> float:
-    return FusionConfig().voxel_resolutions * subject.resolution
+    return voxel_edge(subject.scans, FusionConfig())
 
 
 def _laid(subject: Subject, mesh: TriangleMesh) -> Laid:

@@ -85,7 +85,7 @@ class Count(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         """The column's text."""
-        if task.finished and task.fields["counted"]:
+        if task.finished:
             return Text(task.fields["counted"])
         return Text("" if task.total is None else f"{task.completed:.0f}/{task.total:.0f}")
 

@@ -158,30 +158,42 @@ def split_fans(faces: IntArray) -> tuple[IntArray, IntArray]:
     Returns:
         Faces (G, 3), and the old index (W,) of each new vertex.
     """
+    if not len(faces):
+        return faces, np.zeros(0, dtype=np.int64)
+    faces = _without_back_to_back(faces)
+    rows, columns = _linked_corners(faces)
+    links = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(faces.size,) * 2)
+    num_fans, fan = connected_components(links, directed=False)
+    vertex = np.zeros(num_fans, dtype=np.int64)
+    vertex[fan] = faces.ravel()
+    order = np.argsort(vertex, kind="stable")  # numbered in the order of the old vertices
+    number = np.empty(num_fans, dtype=np.int64)
+    number[order] = np.arange(num_fans)
+    return number[fan].reshape(-1, 3), vertex[order]
+
+
+def _without_back_to_back(faces: IntArray) -> IntArray:
+    """The faces (G, 3) whose corners are those of no other one."""
     corners = np.sort(faces, axis=1)
     order = np.lexsort(corners.T)
     alike = np.concatenate([[False], (np.diff(corners[order], axis=0) == 0).all(axis=1), [False]])
-    faces = faces[np.sort(order[~(alike[:-1] | alike[1:])])]
-    num_corners = faces.size
+    return faces[np.sort(order[~(alike[:-1] | alike[1:])])]
+
+
+def _linked_corners(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Corners (L,) of faces, numbered row by row, and those (L,) of the next face around a vertex.
+
+    Faces hang together by edges that only two of them have, and on whose outside they agree.
+    """
     # Edge k of a face runs from its corner k to the next one.
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    corner = np.arange(num_corners)
-    after = np.roll(corner.reshape(-1, 3), -1, axis=1).ravel()
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.lexsort((high, low))
-    first = np.flatnonzero(np.diff(low[order], prepend=-1) | np.diff(high[order], prepend=-1))
-    pairs = first[np.diff(first, append=num_corners) == 2]
+    edge = np.minimum(start, end) * (int(faces.max(initial=0)) + 1) + np.maximum(start, end)
+    order = np.argsort(edge, kind="stable")
+    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
+    pairs = first[np.diff(first, append=faces.size) == 2]
     a, b = order[pairs], order[pairs + 1]
     # Two faces that agree on their outside run along their edge in opposite directions.
     opposite = start[a] == end[b]
     a, b = a[opposite], b[opposite]
-    rows, columns = np.concatenate([a, after[a]]), np.concatenate([after[b], b])
-    links = coo_array(
-        (np.ones(len(rows), dtype=bool), (rows, columns)), shape=(num_corners, num_corners)
-    )
-    _, fan = connected_components(links, directed=False)
-    # Numbered in the order of the old vertices.
-    _, first, number = np.unique(
-        start * (int(fan.max(initial=0)) + 1) + fan, return_index=True, return_inverse=True
-    )
-    return number.reshape(-1, 3).astype(np.int64), start[first]
+    after = np.roll(np.arange(faces.size).reshape(-1, 3), -1, axis=1).ravel()
+    return np.concatenate([a, after[a]]), np.concatenate([after[b], b])

@@ -71,7 +71,10 @@ def fuse(
     """
     if len(scans) != len(world_from_sensor):
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
-    images, voxel = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), workers)
+    if sum(len(scan.mesh.vertices) for scan in scans) < _MIN_PIXELS:
+        raise InputError("the scans hold no surface that could be fused")
+    images = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), workers)
+    voxel = voxel_edge(scans, config)
     depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
     truncation = max(config.truncation_voxels * voxel, 2.0 * depth)
     volume = integrate(images, voxel, truncation, depth, workers)
@@ -92,27 +95,42 @@ def _images(
     config: FusionConfig,
     prepare: PrepareConfig,
     workers: int,
-) -> tuple[list[PosedImage], float]:
-    """The scans' images at full resolution, in an order of their own, and the voxel's edge."""
+) -> list[PosedImage]:
+    """The scans' images at full resolution, in an order of their own."""
     posed = sorted(
         zip(scans, world_from_sensor, strict=True),
         key=lambda both: (both[0].content_hash, both[1].matrix().tobytes()),
     )
-    if sum(len(scan.mesh.vertices) for scan in scans) < _MIN_PIXELS:
-        raise InputError("the scans hold no surface that could be fused")
-    pixels = [natural_pixel(scan.scan, scan.resolution) for scan, _ in posed]
-    finest = max(scan.diameter for scan in scans) / config.max_voxels_across
+    pixels = _pixels([scan for scan, _ in posed], config)
     images = list(
         map_in_order(
-            lambda k: pose_image(*posed[k], max(pixels[k], finest), prepare),
+            lambda k: pose_image(*posed[k], pixels[k], prepare),
             range(len(posed)),
             workers,
         )
     )
     trusts = free_space_trusts(images)
-    images = [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)]
-    resolution = float(np.quantile([image.pixel for image in images], _FINE_SHARE))
-    return with_noise(images), max(config.voxel_resolutions * resolution, finest)
+    return with_noise(
+        [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)]
+    )
+
+
+def voxel_edge(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
+    """Edge of the voxels that scans are fused in, in their unit."""
+    pairs = zip(_pixels(scans, config), scans, strict=True)
+    footprints = [min(pixel, scan.image.pixel) for pixel, scan in pairs]
+    resolution = float(np.quantile(footprints, _FINE_SHARE))
+    return max(config.voxel_resolutions * resolution, _finest(scans, config))
+
+
+def _pixels(scans: Sequence[PreparedScan], config: FusionConfig) -> list[float]:
+    """Footprints of the images' pixels: as fine as the scans, but no finer than voxels may be."""
+    finest = _finest(scans, config)
+    return [max(natural_pixel(scan.scan, scan.resolution), finest) for scan in scans]
+
+
+def _finest(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
+    return max(scan.diameter for scan in scans) / config.max_voxels_across
 
 
 def _surface(

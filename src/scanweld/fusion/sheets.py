@@ -45,6 +45,8 @@ def without_second_sheets(
     for _ in range(_MAX_PEELS):
         faces, parts = split_fans(faces)
         index = index[parts]
+        if not len(faces):
+            break
         points = vertices[index]
         normals = smoothed_normals(points, faces, _NORMAL_ROUNDS)
         other = second_sheets(points, faces, normals, voxel)
