@@ -9,6 +9,7 @@ import os
 import shutil
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ import pytest
 from PIL import Image
 
 from scanweld.app.html_report import write_html_report
-from tests.model_folders import crowd, whole_folder
+from scanweld.reconstruction import Verdict
+from tests.model_folders import crowd, good_result, small_scene, whole_folder, written
 
 WAIT_SECONDS = 60.0
 FLAGS = (
@@ -126,6 +128,19 @@ def test_page_fits_and_nothing_goes_wrong(browser: Any, page: Path, width: int, 
     background = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
     lightness = np.mean([float(part) for part in background.strip("rgb()").split(",")])
     assert (lightness > 128) == (scheme == "light")
+
+
+def test_a_page_of_given_poses_goes_without_pairs(browser: Any, tmp_path: Path):
+    scene = small_scene()
+    given = replace(good_result(scene), pairs=(), verdict=Verdict.GIVEN)
+    folder = written(tmp_path / "fused", given)
+    show(browser, write_html_report(folder, {scan.name: scan for scan in scene.scans}))
+    assert browser.get_log("browser") == []
+    assert "poses that were given" in browser.find_element("tag name", "h1").text
+    links = browser.find_elements("css selector", "nav a")
+    for link in links:
+        assert browser.find_elements("css selector", link.get_dom_attribute("href"))
+    assert not {"View graph", "Contours"} & {link.text for link in links}
 
 
 def test_the_model_is_drawn_turned_and_reset(browser: Any, page: Path):
