@@ -201,6 +201,9 @@ def test_residual_and_support_of_a_ball_measured_too_large():
     top, bottom = ball.vertices[:, 2] > 5, ball.vertices[:, 2] < -5
     assert set(check.support[top]) == {2} and set(check.support[bottom]) == {1}
     assert thin_share(ball, check.support) == pytest.approx(0.5, abs=0.03)
+    # Where the model knows, nothing is measured anew: its vertices may be closer than points are.
+    told = dataclasses.replace(ball, support=np.full(len(ball.vertices), 3))
+    assert set(check_surface(told, check.points).support) == {3}
     assert np.allclose(check.residual, 0.5, atol=1e-3)
     far = check_surface(ball, {"far": ball.vertices * 3})
     assert far.off_model == 1 and not len(far.all_distances()) and np.isnan(far.residual).all()

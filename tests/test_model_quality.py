@@ -363,7 +363,12 @@ def test_properties_are_written(tmp_path: Path):
     np.testing.assert_allclose(stdev, mesh.stdev, rtol=1e-6)
     support = np.frombuffer(rows[:, -9:-5].tobytes(), "<i4")
     np.testing.assert_array_equal(support, mesh.support)
-    assert len(read_mesh(tmp_path / "model.ply").faces) == len(mesh.faces)
+    found = read_mesh(tmp_path / "model.ply")
+    assert found.support is not None and found.stdev is not None and found.filled is not None
+    assert len(found.faces) == len(mesh.faces)
+    np.testing.assert_array_equal(found.support, mesh.support)
+    np.testing.assert_array_equal(found.filled, mesh.filled)
+    np.testing.assert_allclose(found.stdev, mesh.stdev, rtol=1e-6)
 
 
 def test_sheets_that_touch_come_apart():

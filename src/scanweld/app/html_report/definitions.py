@@ -97,7 +97,9 @@ DEFINITIONS: Mapping[str, Definition] = {
         "off the model", "share of the placed scans' points that have no residual"
     ),
     "support": _defined(
-        "support", "number of scans that have points nearest to a vertex or to its neighbours"
+        "support",
+        "number of scans whose surface lies there, as model.ply says; where it does not, of scans "
+        "that have points nearest to a vertex or to its neighbours",
     ),
     "thin": _defined("seen by one scan", "share of the model's area with a support of at most 1"),
     "holes": _defined(

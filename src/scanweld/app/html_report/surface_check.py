@@ -32,7 +32,8 @@ class SurfaceCheck:
         nearest: and the vertex (N,) nearest to each.
         off_model: Share of all points that lie farther than the reach from the model.
         residual: (V,) mean distance of the points at each vertex, smoothed; NaN without any.
-        support: (V,) number of scans that have points there.
+        support: (V,) number of scans whose surface lies there, as the model says; where it does
+            not, of scans that have points there.
     """
 
     distances: Mapping[str, FloatArray]
@@ -98,7 +99,7 @@ def check_surface(mesh: TriangleMesh, scans: Mapping[str, FloatArray]) -> Surfac
         nearest=vertices,
         off_model=1 - num_used / num_checked if num_checked else 0.0,
         residual=_smoothed(sums, counts, mesh.faces),
-        support=support,
+        support=support if mesh.support is None else mesh.support,
     )
 
 
