@@ -85,9 +85,9 @@ def test_report(result: Reconstruction):
 
 
 @pytest.mark.parametrize("verdict", Verdict)
-def test_only_good_exits_with_zero(result: Reconstruction, verdict: Verdict):
+def test_only_good_and_given_exit_with_zero(result: Reconstruction, verdict: Verdict):
     report = report_json(dataclasses.replace(result, verdict=verdict))
-    assert report["exit_code"] == (0 if verdict == "good" else 3)
+    assert report["exit_code"] == (0 if verdict in ("good", "given") else 3)
 
 
 def test_numbers_that_are_not_finite_become_null(tmp_path: Path, result: Reconstruction):
