@@ -17,10 +17,11 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 # The numbers of README.md and docs/benchmarks.md; needs the Stanford data, takes a quarter of an hour.
-benchmarks: $(VENV)/.installed-dev
+benchmarks: $(VENV)/.installed-bench
 	$(BIN)/python benchmarks/run.py --seeds 3 --out docs/data/sets.json
 	$(BIN)/python benchmarks/pairs.py --seeds 3 --keypoints heat even mixed --out docs/data/pairs.json --plot docs/pairs.png
 	$(BIN)/python benchmarks/keypoints.py --out docs/data/keypoints.json
+	$(BIN)/python benchmarks/model.py --out docs/data/model.json
 	$(BIN)/python benchmarks/pages.py
 
 # The paper's tables and figures beside ours, into docs/paper; needs the Stanford data, takes up to

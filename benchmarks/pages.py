@@ -14,13 +14,14 @@ from typing import Any
 
 import blocks
 import keypoints
+import model_tables
 import pairs
 import run
 from results import DATA, read_results
 from scanweld.io.atomic import write_whole
 
 ROOT = Path(__file__).parents[1]
-PAGES = (ROOT / "README.md", ROOT / "docs/benchmarks.md")
+PAGES = (ROOT / "README.md", ROOT / "docs/benchmarks.md", ROOT / "docs/model.md")
 USAGE_ERROR = 2
 IN_WORDS = {
     "bunny10": "Stanford bunny, 10 real scans",
@@ -143,12 +144,27 @@ def _keypoints(records: Records) -> str:
     return "\n".join(keypoints.table(records)) + "\n"
 
 
+def _model(records: Records) -> str:
+    return "\n".join(model_tables.fidelity_table(records)) + "\n"
+
+
+def _model_rivals(records: Records) -> str:
+    return "\n".join(model_tables.rivals_table(records)) + "\n"
+
+
+def _model_many(records: Records) -> str:
+    return "\n".join(model_tables.many_table(records)) + "\n"
+
+
 BLOCKS: dict[str, tuple[str, Callable[[Records], str]]] = {
     "sets-in-words": ("sets", _sets_in_words),
     "sets": ("sets", _sets),
     "pairs-in-words": ("pairs", _pairs_in_words),
     "pairs": ("pairs", _pairs),
     "keypoints": ("keypoints", _keypoints),
+    "model": ("model", _model),
+    "model-rivals": ("model", _model_rivals),
+    "model-many": ("model", _model_many),
 }
 """Part of a page -> its results in docs/data, and what says them in Markdown."""
 

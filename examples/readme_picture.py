@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 import scanweld
-from scanweld.evaluation.render import render_shaded, side_by_side, write_png
 from scanweld.geometry.mesh import face_normals
+from scanweld.geometry.shading import render_shaded, side_by_side, write_png
 from scanweld.prepare import prepare
 
 VIEW = np.array([0.75, 1.0, 0.4])

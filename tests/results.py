@@ -11,7 +11,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge import Knowledge
 from scanweld.pairs.result import Evidence, PairKind
-from scanweld.progress import Cache, NoCache, Progress, silent
+from scanweld.progress import Cache, NoCache, Progress, StageAdvanced, silent
 from scanweld.reconstruction import (
     AlternativeReport,
     PairReport,
@@ -113,6 +113,6 @@ def stub_run(
         raise InputError(f"only {len(scans)} of the scans can be read; give two or more")
     (knowledge or Knowledge()).check_names([scan.name for scan in scans])
     for done, scan in enumerate(scans):
-        progress("prepare", done + 1, len(scans))
+        progress(StageAdvanced(stage="prepare", done=done + 1, total=len(scans)))
         (cache or NoCache()).put(scan.content_hash(), scan.name)
     return a_result([scan.name for scan in scans], unreadable, config)

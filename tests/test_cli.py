@@ -83,6 +83,7 @@ def test_run_writes_the_output_and_a_summary(scans: Path, capsys: pytest.Capture
         "graph.json",
         "model.ply",
         "poses.json",
+        "report.html",
         "report.json",
     ]
     assert not work_folder(Path("model")).exists()
@@ -111,6 +112,16 @@ def test_options_reach_the_settings(scans: Path, monkeypatch: pytest.MonkeyPatch
     assert seen["workers"] == 2
 
 
+def test_options_of_the_model_are_settings_of_the_fusion(scans: Path):
+    Path("my.toml").write_text("[fusion]\nsmooth = 7\nmax_voxels_across = 60\n")
+    options = ["--holes", "carve", "--component", "largest", "--watertight", "--faces", "500"]
+    assert scanweld("run", scans, "-o", "model", "--config", "my.toml", *options) == 0
+    fusion = json.loads(Path("model/report.json").read_text())["settings"]["fusion"]
+    told = [fusion[key] for key in ("holes", "component", "watertight", "faces")]
+    assert told == ["carve", "largest", True, 500]
+    assert (fusion["smooth"], fusion["max_voxels_across"]) == (7, 60)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -124,6 +135,8 @@ def test_options_reach_the_settings(scans: Path, monkeypatch: pytest.MonkeyPatch
         ["run", "scans", "-o", "model", "--seed", "-1"],
         ["run", "scans", "-o", "model", "--unit", "foo"],
         ["run", "scans", "-o", "model", "--method", "nonsense"],
+        ["run", "scans", "-o", "model", "--holes", "some"],
+        ["run", "scans", "-o", "model", "--faces", "3"],
         ["nonsense"],
         ["info"],
         ["simulate", "mesh.ply"],

@@ -45,7 +45,9 @@ def pages(monkeypatch: pytest.MonkeyPatch):
             del sys.modules[name]
 
 
-@pytest.mark.parametrize("path", [ROOT / "README.md", DOCS / "benchmarks.md"], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "path", [ROOT / "README.md", DOCS / "benchmarks.md", DOCS / "model.md"], ids=lambda p: p.name
+)
 def test_measured_parts_are_those_of_the_results(path: Path, pages: ModuleType):
     text = path.read_text(encoding="utf-8")
     assert BLOCK.findall(text)

@@ -35,7 +35,7 @@ def die():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def progress(stage, done, total):
+def progress(event):
     global calls
     calls += 1
     if calls == int(moment):
@@ -59,10 +59,10 @@ def run(
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files of an output, the report without the stages, which tell of times."""
+    """All files of an output, without what tells of times: the stages, and the page made of all."""
     files = {path.name: path.read_bytes() for path in folder.iterdir()}
     report = json.loads(files.pop("report.json"))
-    del report["stages"]
+    del report["stages"], files["report.html"]
     return {**files, "report": json.dumps(report).encode()}
 
 

@@ -10,7 +10,8 @@ import pytest
 from scipy.spatial import KDTree
 
 from scanweld.app import job
-from scanweld.app.job import run_job
+from scanweld.app.fuse import fuse_job
+from scanweld.app.job import report_job, run_job
 from scanweld.app.memory import (
     MEGABYTE,
     MIN_POINTS,
@@ -220,3 +221,8 @@ def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     assert told["large"]["num_points"] <= 1200
     assert any("thinned from" in note for note in told["large"]["notes"])
     assert not any("thinned" in note for note in told["scan_01"]["notes"])
+    # Who looks at the scans again thins them alike, and finds what the model was made of.
+    assert told["large"]["verdict"] != "unplaced"
+    page = (tmp_path / "model" / "report.html").read_bytes()
+    assert report_job(tmp_path / "model").read_bytes() == page
+    assert fuse_job([folder], tmp_path / "model", tmp_path / "fused").mesh is not None

@@ -85,9 +85,9 @@ def test_report(result: Reconstruction):
 
 
 @pytest.mark.parametrize("verdict", Verdict)
-def test_only_good_exits_with_zero(result: Reconstruction, verdict: Verdict):
+def test_only_good_and_given_exit_with_zero(result: Reconstruction, verdict: Verdict):
     report = report_json(dataclasses.replace(result, verdict=verdict))
-    assert report["exit_code"] == (0 if verdict == "good" else 3)
+    assert report["exit_code"] == (0 if verdict in ("good", "given") else 3)
 
 
 def test_numbers_that_are_not_finite_become_null(tmp_path: Path, result: Reconstruction):
@@ -152,7 +152,7 @@ def test_summary_says_verdict_reasons_and_files(result: Reconstruction):
     lines = summary(result, Path("model")).splitlines()
     assert lines[0] == "partial: 3 of 5 scans are placed"
     assert "  unplaced a: empty" in lines and "  unplaced überzählig: of another object" in lines
-    assert lines[-1].startswith("  model: model.ply (3 vertices), poses.json")
+    assert lines[-1].startswith("  model: model.ply (3 vertices), report.html")
 
 
 def test_summary_of_several_components_names_them():

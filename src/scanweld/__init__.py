@@ -31,6 +31,7 @@ from scanweld.io.scans import read_scans
 from scanweld.knowledge import Knowledge, read_knowledge
 from scanweld.pairs.result import Evidence, PairKind
 from scanweld.pipeline import run
+from scanweld.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
 from scanweld.reconstruction import (
     FactReport,
     FactVerdict,
@@ -46,6 +47,7 @@ __all__ = [
     "CameraModel",
     "Config",
     "ConfigError",
+    "Event",
     "Evidence",
     "FactReport",
     "FactVerdict",
@@ -59,9 +61,13 @@ __all__ = [
     "RangeScan",
     "ReadError",
     "Reconstruction",
+    "ScanRefused",
     "ScanReport",
     "ScanVerdict",
     "ScanweldError",
+    "StageAdvanced",
+    "StageFinished",
+    "StageStarted",
     "TriangleMesh",
     "Verdict",
     "Viewpoint",

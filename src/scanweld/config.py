@@ -16,6 +16,8 @@ from scanweld.errors import ConfigError
 Unit = Literal["m", "cm", "mm", "in"]
 Method = Literal["robust", "paper"]
 Positive = Annotated[float, Field(gt=0)]
+Holes = Literal["open", "fill", "carve"]
+Component = Literal["largest", "all"]
 Count = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(gt=0, le=1)]
 Pruning = Literal["self-occlusion", "observed", "predicted"]
@@ -202,14 +204,25 @@ class ConfidenceConfig(Section):
 class FusionConfig(Section):
     """Posed scans -> one mesh."""
 
-    voxel_resolutions: float = Field(default=1.5, gt=0)
+    voxel_resolutions: float = Field(default=1.0, gt=0)
     """Edge of a voxel, where that is not too fine for the number of voxels below."""
-    max_voxels_across: int = Field(default=400, ge=50)
+    max_voxels_across: int = Field(default=1000, ge=50)
     """Voxels across the object's diameter, at most."""
     truncation_voxels: float = Field(default=4.0, ge=2)
     """Distance at which the signed distance is cut off."""
     with_doubtful: bool = False
     """Whether doubtful scans are part of the model too: they are placed, but may be wrong."""
+    holes: Holes = "open"
+    """What becomes of what no scan saw: left open, spanned by a membrane ("fill"), or bounded by
+    the space that was seen empty ("carve"). What was not measured is marked in the model."""
+    component: Component = "all"
+    """Whether every connected piece is kept that is no crumb, or only the largest."""
+    watertight: bool = False
+    """Whether the mesh must be closed: holes are filled, unless they are carved."""
+    smooth: int = Field(default=0, ge=0, le=1000)
+    """Rounds of smoothing that does not shrink (Taubin 1995); borders stay."""
+    faces: int | None = Field(default=None, ge=4)
+    """Triangles of the model, about; all that the voxels give if not given."""
 
 
 class Config(Section):
@@ -240,7 +253,9 @@ class Config(Section):
 
 
 def load_config(path: Path | None, **overrides: Any) -> Config:
-    """Settings from defaults, then a TOML file, then top-level overrides that are not None.
+    """Settings from defaults, then a TOML file, then overrides that are not None.
+
+    Overrides are top-level settings, or a whole section's as a mapping.
 
     Raises:
         ConfigError: If the file cannot be read, or a setting is unknown or out of its range.
@@ -251,7 +266,12 @@ def load_config(path: Path | None, **overrides: Any) -> Config:
             values = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise ConfigError(f"{path}: cannot be read as TOML settings ({error})") from error
-    values.update({key: value for key, value in overrides.items() if value is not None})
+    for key, value in overrides.items():
+        if isinstance(value, dict) and isinstance(values.get(key, {}), dict):
+            given = {name: setting for name, setting in value.items() if setting is not None}
+            values[key] = {**values.get(key, {}), **given}
+        elif value is not None:
+            values[key] = value
     try:
         return Config.model_validate(values)
     except ValidationError as error:

@@ -1,7 +1,6 @@
 """What comes in: scans prepared, sorted by content, those that cannot take part, what is known."""
 
-import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +12,11 @@ from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.knowledge import Knowledge
 from scanweld.multiview.given import Given
 from scanweld.prepare import prepare, stands_on_support
+from scanweld.progress import ScanRefused
 from scanweld.stages import Stages
 
-logger = logging.getLogger(__name__)
+Refuse = Callable[[str, str], None]
+"""Called with a scan's name and the reason why it cannot take part."""
 
 MAX_SIZE_RATIO = 6.0
 """A scan this many times larger or smaller than the others is in another unit, or not of it."""
@@ -70,17 +71,27 @@ def take_in(
         raise InputError("two scans have the same name; names must be unique")
     knowledge.check_names({*names, *unreadable})
     refused = dict(unreadable)
+
+    def refuse(name: str, reason: str) -> None:
+        if name not in refused:
+            refused[name] = reason
+            stages.progress(ScanRefused(scan=name, reason=reason))
+
+    def prepare_each(standing: Container[str] = ()) -> list[PreparedScan]:
+        outcomes = stages.each(
+            "prepare",
+            lambda scan: _try_prepare(scan, config, scan.name in standing),
+            kept,
+            then=lambda scan, found: refuse(scan.name, found) if isinstance(found, str) else None,
+        )
+        return [found for found in outcomes if not isinstance(found, str)]
+
     with stages.stage("prepare") as counts:
-        kept = _without_duplicates(scans, refused)
-        kept = _of_one_size(kept, refused)
-        outcomes = stages.each("prepare", lambda scan: _try_prepare(scan, config), kept)
-        prepared = _usable(kept, outcomes, refused)
+        kept = _of_one_size(_without_duplicates(scans, refuse), refuse)
+        prepared = prepare_each()
         standing = {scan.name for scan in prepared if stands_on_support(scan)}
         if config.prepare.support == "left out" and len(standing) >= MOST * len(prepared):
-            outcomes = stages.each(
-                "prepare", lambda scan: _try_prepare(scan, config, scan.name in standing), kept
-            )
-            prepared = _usable(kept, outcomes, refused)
+            prepared = prepare_each(standing)
         counts["scans"] = len(prepared)
         counts["refused"] = len(refused)
     if len(prepared) < 2:
@@ -100,7 +111,7 @@ def take_in(
     )
 
 
-def _without_duplicates(scans: Sequence[RangeScan], refused: dict[str, str]) -> list[RangeScan]:
+def _without_duplicates(scans: Sequence[RangeScan], refuse: Refuse) -> list[RangeScan]:
     first: dict[str, str] = {}
     kept = []
     for scan in sorted(scans, key=lambda scan: scan.name):
@@ -108,11 +119,11 @@ def _without_duplicates(scans: Sequence[RangeScan], refused: dict[str, str]) -> 
         if original == scan.name:
             kept.append(scan)
         else:
-            refused[scan.name] = f"same content as {original}, which is kept"
+            refuse(scan.name, f"same content as {original}, which is kept")
     return kept
 
 
-def _of_one_size(scans: Sequence[RangeScan], refused: dict[str, str]) -> list[RangeScan]:
+def _of_one_size(scans: Sequence[RangeScan], refuse: Refuse) -> list[RangeScan]:
     sizes = [principal_diameter(scan.points) if len(scan.points) > 3 else 0.0 for scan in scans]
     usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
     kept = []
@@ -122,7 +133,8 @@ def _of_one_size(scans: Sequence[RangeScan], refused: dict[str, str]) -> list[Ra
             kept.append(scan)
             continue
         larger = "larger" if size > usual else "smaller"
-        refused[scan.name] = f"{ratio:.3g} times {larger} than the other scans{_unit_hint(ratio)}"
+        told = f"{ratio:.3g} times {larger} than the other scans{_unit_hint(ratio)}"
+        refuse(scan.name, told)
     return kept
 
 
@@ -131,18 +143,6 @@ def _unit_hint(ratio: float) -> str:
     if abs(np.log(ratio / closest)) > np.log(2.0):
         return "; is it of the same object?"
     return f"; units mixed up ({UNIT_RATIOS[closest]})? Give all scans in one unit"
-
-
-def _usable(
-    scans: Sequence[RangeScan], outcomes: Sequence[PreparedScan | str], refused: dict[str, str]
-) -> list[PreparedScan]:
-    prepared = []
-    for scan, outcome in zip(scans, outcomes, strict=True):
-        if isinstance(outcome, str):
-            refused[scan.name] = outcome
-        else:
-            prepared.append(outcome)
-    return prepared
 
 
 def _try_prepare(

@@ -49,7 +49,7 @@ def conclude(
     unplaced = dict(intake.refused)
     unplaced.update({prepared[k].name: reason for k, reason in graph.unplaced.items()})
     scans = {
-        name: _unplaced_report(intake.scans.get(name), reason) for name, reason in unplaced.items()
+        name: unplaced_report(intake.scans.get(name), reason) for name, reason in unplaced.items()
     }
     for k, scan in enumerate(prepared):
         found = features[k]
@@ -114,7 +114,8 @@ def _poses(prepared: Sequence[PreparedScan], graph: ViewGraph) -> dict[str, Pose
     return dict(sorted(poses.items()))
 
 
-def _unplaced_report(scan: RangeScan | None, reason: str) -> ScanReport:
+def unplaced_report(scan: RangeScan | None, reason: str) -> ScanReport:
+    """What is known of a scan that has no pose, if it could be read at all."""
     if scan is None:
         return ScanReport(verdict=ScanVerdict.UNPLACED, reason=reason)
     return ScanReport(
@@ -126,6 +127,23 @@ def _unplaced_report(scan: RangeScan | None, reason: str) -> ScanReport:
         viewpoint=scan.viewpoint,
         notes=scan.notes,
         content_hash=scan.content_hash(),
+    )
+
+
+def prepared_report(scan: PreparedScan, verdict: ScanVerdict, reason: str) -> ScanReport:
+    """What is known of a scan by itself, once it is prepared."""
+    return ScanReport(
+        verdict=verdict,
+        reason=reason,
+        num_points=len(scan.scan.points),
+        num_dropped=scan.scan.num_dropped,
+        resolution=scan.resolution,
+        diameter=scan.diameter,
+        camera=_camera_words(scan.scan.camera),
+        viewpoint=scan.scan.viewpoint,
+        notes=scan.scan.notes,
+        content_hash=scan.content_hash,
+        is_without_support=scan.is_without_support,
     )
 
 
@@ -152,17 +170,8 @@ def _scan_report(
             verdict = ScanVerdict.GOOD
             pairs = "one pair" if len(neighbours) == 1 else f"{len(neighbours)} pairs"
             reason = f"held by {pairs}; {told}"
-    return ScanReport(
-        verdict=verdict,
-        reason=reason,
-        num_points=len(scan.scan.points),
-        num_dropped=scan.scan.num_dropped,
-        resolution=scan.resolution,
-        diameter=scan.diameter,
-        camera=_camera_words(scan.scan.camera),
-        viewpoint=scan.scan.viewpoint,
-        notes=scan.scan.notes,
-        content_hash=scan.content_hash,
+    return replace(
+        prepared_report(scan, verdict, reason),
         num_keypoints=num_keypoints,
         edges=tuple(sorted(prepared[n].name for n in neighbours)),
         overlap=overlap,

@@ -19,11 +19,12 @@ class Verdict(StrEnum):
     PARTIAL = "partial"
     DOUBTFUL = "doubtful"
     NOTHING = "nothing"
+    GIVEN = "given"
 
     @property
     def exit_code(self) -> int:
-        """0 for good, else 3."""
-        return 0 if self is Verdict.GOOD else 3
+        """0 for good, and where all poses were given; else 3."""
+        return 0 if self in (Verdict.GOOD, Verdict.GIVEN) else 3
 
 
 class ScanVerdict(StrEnum):
@@ -32,6 +33,7 @@ class ScanVerdict(StrEnum):
     GOOD = "good"
     DOUBTFUL = "doubtful"
     UNPLACED = "unplaced"
+    GIVEN = "given"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -39,7 +41,7 @@ class ScanReport:
     """What became of one scan.
 
     Attributes:
-        verdict: Good, doubtful or unplaced.
+        verdict: Good, doubtful or unplaced; given if its pose was, and is not judged.
         reason: Why, in a sentence.
         num_points: Finite points read; 0 if the scan could not be read.
         num_dropped: NaN and infinite points left out.
@@ -54,6 +56,7 @@ class ScanReport:
         overlap: Largest share of its samples that agree with one other placed scan; None if
             unplaced.
         rms: Point-to-plane residual after the joint refinement, in the scans' unit.
+        is_without_support: Whether the plane that the object stands on was left out.
         confidence: Probability that it is placed rightly beside the others of its component; None
             if unplaced.
         grounds: What the confidence rests on, see docs/report.md.
@@ -73,6 +76,7 @@ class ScanReport:
     edges: tuple[str, ...] = ()
     overlap: float | None = None
     rms: float | None = None
+    is_without_support: bool = False
     confidence: float | None = None
     grounds: Mapping[str, float] = field(default_factory=dict)
 

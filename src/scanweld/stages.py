@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from scanweld.config import Section
 from scanweld.parallel import map_in_order
-from scanweld.progress import Cache, Progress
+from scanweld.progress import Cache, Progress, StageAdvanced, telling
 from scanweld.reconstruction import StageReport
 
 logger = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ class Stages:
     Attributes:
         workers: Threads that work over scans and pairs.
         cache: Where finished work is kept.
-        progress: Told of every finished item.
+        progress: Told what happens.
         reports: Time, memory and counts of the stages so far.
     """
 
@@ -41,13 +41,11 @@ class Stages:
     @contextmanager
     def stage(self, name: str) -> Iterator[dict[str, int | float]]:
         """Time a stage; what is put into the yielded dict is reported as its counts."""
-        counts: dict[str, int | float] = {}
         start = time.perf_counter()
-        self.progress(name, 0, 1)
-        yield counts
+        with telling(self.progress, name) as counts:
+            yield counts
         seconds = time.perf_counter() - start
         self.reports[name] = StageReport(seconds=seconds, peak_mb=peak_memory_mb(), counts=counts)
-        self.progress(name, 1, 1)
         told = ", ".join(f"{key} {value}" for key, value in counts.items())
         logger.info("%s: %s (%.1f s)", name, told, seconds)
 
@@ -57,8 +55,17 @@ class Stages:
         function: Callable[[Item], Result],
         items: Sequence[Item],
         key: Callable[[Item], str] | None = None,
+        then: Callable[[Item, Result], None] | None = None,
     ) -> list[Result]:
-        """Apply a function to every item, in parallel; with a key, finished items are kept."""
+        """Apply a function to every item, in parallel.
+
+        Args:
+            name: Of the stage.
+            function: What is to be done.
+            items: With what.
+            key: Of an item's work; if given, finished work is kept and found again.
+            then: Called with each item and its result, in order, as soon as that is there.
+        """
 
         def finished(item: Item) -> Result:
             if key is None:
@@ -72,9 +79,11 @@ class Stages:
             return result
 
         results = []
-        for result in map_in_order(finished, items, self.workers):
+        for item, result in zip(items, map_in_order(finished, items, self.workers), strict=True):
             results.append(result)
-            self.progress(name, len(results), len(items))
+            if then is not None:
+                then(item, result)
+            self.progress(StageAdvanced(stage=name, done=len(results), total=len(items)))
         return results
 
 

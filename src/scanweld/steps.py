@@ -27,6 +27,7 @@ from scanweld.pairs.field import ScanField, make_field
 from scanweld.pairs.pixels import Told, see, told_of
 from scanweld.pairs.result import Evidence, PairResult
 from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.progress import ScanRefused
 from scanweld.reconstruction import FactReport
 from scanweld.stages import Stages, work_key
 
@@ -150,6 +151,8 @@ def refine_placed(
         graph = replace(graph, doubts={**_scale_doubts(intake, graph), **doubts})
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
+    for k, reason in graph.unplaced.items():
+        stages.progress(ScanRefused(scan=intake.prepared[k].name, reason=reason))
     return graph
 
 
@@ -235,6 +238,8 @@ def fuse_largest(
                 [prepared[k] for k in order],
                 [world_from_reference @ component.poses[k] for k in order],
                 config.fusion,
+                prepare=config.prepare,
+                workers=stages.workers,
             )
         except InputError as error:
             logger.warning("no model: %s", error)

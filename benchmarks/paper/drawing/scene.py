@@ -7,12 +7,12 @@ import numpy as np
 
 from benchmarks.paper.drawing.shade import ambient_occlusion
 from benchmarks.paper.drawing.style import INK, PAPER
-from scanweld.evaluation.render import barycentric, looking_from
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.rasterize import render_depth
+from scanweld.geometry.shading import barycentric, looking_from
 
 _OVERSAMPLING = 2
 _GAMMA = 2.2

@@ -15,10 +15,32 @@ from typing import Annotated
 import typer
 
 from scanweld.app.comparison import compare, comparison_table
+from scanweld.app.fusion_options import (
+    ComponentOption,
+    FacesOption,
+    HolesOption,
+    SmoothOption,
+    WatertightOption,
+    fusion_settings,
+)
 from scanweld.app.info import describe_scan
-from scanweld.app.job import run_job
+from scanweld.app.job import report_job, run_job
+from scanweld.app.json_lines import finished_line
 from scanweld.app.memory import parse_size
+from scanweld.app.model_commands import export, fuse
 from scanweld.app.named_pairs import named_pairs, with_pairs_joined
+from scanweld.app.options import (
+    NOT_GOOD,
+    ConfigFile,
+    Force,
+    Inputs,
+    Json,
+    Output,
+    Quiet,
+    UnitOption,
+    Verbose,
+    Workers,
+)
 from scanweld.app.progress import reporting
 from scanweld.app.summary import summary
 from scanweld.app.workspace import work_folder
@@ -34,7 +56,6 @@ from scanweld.knowledge import Knowledge, read_knowledge
 
 ERROR = 1
 USAGE = 2
-NOT_GOOD = 3
 INTERRUPTED = 130
 
 app = typer.Typer(
@@ -59,24 +80,9 @@ class MethodName(StrEnum):
     PAPER = "paper"
 
 
-class LengthUnit(StrEnum):
-    """What the scans' coordinates are measured in."""
-
-    M = "m"
-    CM = "cm"
-    MM = "mm"
-    IN = "in"
-
-
-Inputs = Annotated[
-    list[str], typer.Argument(metavar="INPUTS...", help="Scan files, folders or glob patterns.")
-]
 Files = Annotated[
     list[str], typer.Argument(metavar="FILES...", help="Scan files, folders or glob patterns.")
 ]
-Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")]
-ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
 Memory = Annotated[
     str | None,
     typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
@@ -85,9 +91,6 @@ Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random
 WithDoubtful = Annotated[
     bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Warnings only, no progress.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log.")]
 MethodOption = Annotated[
     MethodName | None, typer.Option(help="robust (the default), or paper: as published.")
 ]
@@ -112,7 +115,6 @@ Apart = Annotated[
 TurntableFlag = Annotated[
     bool, typer.Option("--turntable", help="All scans turn about one, unknown axis.")
 ]
-UnitOption = Annotated[LengthUnit | None, typer.Option(help="Unit of the scans' coordinates.")]
 
 
 @app.command()
@@ -132,7 +134,13 @@ def run(
     apart: Apart = None,
     turntable: TurntableFlag = False,
     with_doubtful: WithDoubtful = False,
+    holes: HolesOption = None,
+    component: ComponentOption = None,
+    watertight: WatertightOption = False,
+    smooth: SmoothOption = None,
+    faces: FacesOption = None,
     force: Force = False,
+    as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -142,10 +150,11 @@ def run(
         seed=seed,
         unit=None if unit is None else unit.value,
         method=None if method is None else method.value,
+        fusion={
+            **fusion_settings(holes, component, watertight, smooth, faces),
+            "with_doubtful": with_doubtful or None,
+        },
     )
-    if with_doubtful:
-        fusion = settings.fusion.model_copy(update={"with_doubtful": True})
-        settings = settings.model_copy(update={"fusion": fusion})
     known = Knowledge(
         fix=tuple(fix or ()),
         start=None if start is None else read_poses(start),
@@ -156,7 +165,7 @@ def run(
     if knowledge is not None:
         known = read_knowledge(knowledge).joined(known)
     try:
-        with reporting(quiet=quiet, verbose=verbose) as progress:
+        with reporting(quiet=quiet, verbose=verbose, as_json=as_json) as progress:
             result = run_job(
                 inputs,
                 output,
@@ -172,8 +181,21 @@ def run(
         remark = f"the same command goes on from {kept}" if kept.exists() else "nothing was written"
         typer.echo(f"scanweld: interrupted; {remark}", err=True)
         raise typer.Exit(INTERRUPTED) from None
-    typer.echo(summary(result, output))
+    typer.echo(finished_line(result, output) if as_json else summary(result, output))
     raise typer.Exit(result.verdict.exit_code)
+
+
+@app.command()
+def report(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="Folder that run or fuse has made.")
+    ],
+    scans: Annotated[
+        list[str], typer.Option(help="The scans, if they have been moved since.")
+    ] = [],  # noqa: B006
+) -> None:
+    """Write report.html of a finished model folder anew."""
+    typer.echo(report_job(model, scans))
 
 
 @app.command()
@@ -229,6 +251,10 @@ def evaluate(
     errors = compare(estimate, truth, scans)
     typer.echo(comparison_table(errors))
     raise typer.Exit(0 if errors.count(Standing.RIGHT) == len(errors.scans) else NOT_GOOD)
+
+
+app.command()(fuse)
+app.command()(export)
 
 
 def _print_error(error: ScanweldError) -> None:

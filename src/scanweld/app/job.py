@@ -1,21 +1,24 @@
-"""The main job: files to an output folder."""
+"""The main job, files to an output folder; and its report written anew."""
 
 import logging
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld import pipeline
+from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
+from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
-from scanweld.errors import ReadError
+from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, collect, printable, read_scan
 from scanweld.knowledge import Knowledge
 from scanweld.parallel import num_workers
 from scanweld.prepare.thinning import thinned
-from scanweld.progress import Progress, silent
+from scanweld.progress import Progress, ScanRefused, StageAdvanced, silent, telling
 from scanweld.reconstruction import Reconstruction
 from scanweld.stages import peak_memory_mb
 
@@ -44,7 +47,7 @@ def run_job(
         memory: Bytes that the run may take: large scans are thinned for it, and fewer are prepared
             at a time if need be. Any if None.
         force: Whether an output that is there already is replaced.
-        progress: Called with (stage, done, total).
+        progress: Told of stages, their finished items, and scans that are refused.
 
     Raises:
         ScanweldError: If there is too little to work on, or the output cannot be written. Files
@@ -67,11 +70,22 @@ def run_job(
             cache=workspace.cache,
             progress=progress,
         )
-        write_outputs(result, workspace.staging)
+        places = relative_paths(files, workspace.output)
+        write_outputs(result, workspace.staging, places, max_points)
+        with telling(progress, "report"):
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
     return result
+
+
+def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:
+    """Where each scan's file is, by the scan's name, as seen from a folder."""
+    return {
+        file.name: printable(Path(os.path.relpath(os.path.abspath(file.path), folder)).as_posix())
+        for file in files
+    }
 
 
 def read_all(
@@ -80,12 +94,39 @@ def read_all(
     """Scans of all files that can be read, thinned if need be; of the others, name -> reason."""
     scans: list[RangeScan] = []
     unreadable: dict[str, str] = {}
-    for done, file in enumerate(files):
-        progress("read", done, len(files))
-        try:
-            scan = read_scan(file.path, file.name)
-            scans.append(scan if max_points is None else thinned(scan, max_points))
-        except ReadError as error:
-            unreadable[file.name] = printable(str(error))
-    progress("read", len(files), len(files))
+    with telling(progress, "read") as counts:
+        for done, file in enumerate(files, start=1):
+            try:
+                scan = read_scan(file.path, file.name)
+                scans.append(scan if max_points is None else thinned(scan, max_points))
+            except ReadError as error:
+                unreadable[file.name] = printable(str(error))
+                progress(ScanRefused(scan=file.name, reason=unreadable[file.name]))
+            progress(StageAdvanced(stage="read", done=done, total=len(files)))
+        counts["scans"] = len(scans)
     return scans, unreadable
+
+
+def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
+    """Write report.html of a finished model folder anew: ``scanweld report``.
+
+    Args:
+        folder: What ``scanweld run`` or ``fuse`` made.
+        inputs: The scans it was made of, where they are no longer where the report says. Where
+            they are not found at all, the page goes without what only they can tell.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        ScanweldError: If the folder is not whole, or the scans are not those of the run.
+    """
+    model = open_model(Path(folder))
+    try:
+        files = model.scan_files(model.poses.poses, inputs)
+    except InputError as error:
+        if inputs:
+            raise
+        logger.warning("%s; without them there are no residuals, support and contours", error)
+        return write_html_report(model.path)
+    return write_html_report(model.path, model.read_scans(files))

@@ -15,12 +15,19 @@ FORMAT = 1
 Json = Mapping[str, Any]
 
 
-def write_outputs(result: Reconstruction, folder: Path) -> None:
+def write_outputs(
+    result: Reconstruction,
+    folder: Path,
+    files: Mapping[str, str] | None = None,
+    max_points: int | None = None,
+) -> None:
     """Write everything a run found out into a folder.
 
     Args:
         result: What the run found out.
         folder: An existing folder. There is no model.ply where there is no mesh.
+        files: Where each scan's file is, as seen from the folder's final place.
+        max_points: To how many points scans were thinned at most, if they were.
 
     Raises:
         WriteError: If a file cannot be written.
@@ -30,7 +37,8 @@ def write_outputs(result: Reconstruction, folder: Path) -> None:
     )
     write_poses(folder / "poses.json", poses)
     write_whole(folder / "graph.json", json_text(graph_json(result)).encode())
-    write_whole(folder / "report.json", json_text(report_json(result)).encode())
+    report = report_json(result, files, max_points)
+    write_whole(folder / "report.json", json_text(report).encode())
     write_whole(folder / "config.toml", result.config.to_toml().encode())
     if result.mesh is not None:
         write_mesh_ply(folder / "model.ply", result.mesh)
@@ -41,8 +49,13 @@ def graph_json(result: Reconstruction) -> Json:
     return {"format": FORMAT, "pairs": [_pair(pair) for pair in result.pairs]}
 
 
-def report_json(result: Reconstruction) -> Json:
+def report_json(
+    result: Reconstruction,
+    files: Mapping[str, str] | None = None,
+    max_points: int | None = None,
+) -> Json:
     """The verdict, as a whole and scan by scan, the stages' costs and the settings."""
+    files = files or {}
     names = sorted(result.scans, key=natural_key)
     facts = [asdict(fact) for fact in result.knowledge]
     return {
@@ -51,7 +64,8 @@ def report_json(result: Reconstruction) -> Json:
         "exit_code": result.verdict.exit_code,
         "reasons": list(result.reasons),
         **({"knowledge": facts} if facts else {}),
-        "scans": {name: asdict(result.scans[name]) for name in names},
+        **({} if max_points is None else {"max_points": max_points}),
+        "scans": {name: asdict(result.scans[name]) | {"file": files.get(name)} for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),
     }
@@ -81,6 +95,7 @@ def _pair(pair: PairReport) -> Json:
 
 
 def _stage(stage: StageReport) -> Json:
+    """What a stage cost, and what it counted."""
     return {"seconds": round(stage.seconds, 3), "peak_mb": round(stage.peak_mb, 1), **stage.counts}
 
 

@@ -29,11 +29,18 @@ def summary(result: Reconstruction, output: Path) -> str:
 
 def sentence(result: Reconstruction) -> str:
     """How many scans are placed, and in how many pieces."""
-    total, placed = len(result.scans), len(result.poses)
-    if result.verdict is Verdict.NOTHING:
+    return verdict_sentence(
+        result.verdict, len(result.scans), len(result.poses), len(result.components)
+    )
+
+
+def verdict_sentence(verdict: Verdict, total: int, placed: int, pieces: int) -> str:
+    """The verdict in words, from the numbers of scans, of those placed, and of components."""
+    if verdict is Verdict.NOTHING:
         return f"no two of the {total} scans could be brought together"
+    if verdict is Verdict.GIVEN:
+        return f"all {total} scans are fused with the poses that were given"
     share = f"all {total} scans are" if placed == total else f"{placed} of {total} scans are"
-    pieces = len(result.components)
     return f"{share} placed" + (f", in {pieces} separate components" if pieces > 1 else "")
 
 
@@ -50,4 +57,4 @@ def _in_order(reasons: dict[str, str]) -> list[tuple[str, str]]:
 def _files(result: Reconstruction) -> list[str]:
     mesh = result.mesh
     model = [] if mesh is None else [f"model.ply ({len(mesh.vertices):,} vertices)"]
-    return [*model, "poses.json", "graph.json", "report.json", "config.toml"]
+    return [*model, "report.html", "poses.json", "graph.json", "report.json", "config.toml"]

@@ -77,6 +77,21 @@ def sample_surface(
     return a + u[:, None] * (b - a) + v[:, None] * (c - a), face_of
 
 
+def surface_distances(
+    points: FloatArray, mesh: TriangleMesh, *, num_samples: int = 100_000, seed: int = 0
+) -> FloatArray:
+    """Distances (N,) of points (N, 3) from a surface.
+
+    Args:
+        points: In the frame of the mesh.
+        mesh: The surface.
+        num_samples: Marks on it, by which its large triangles are found.
+        seed: Of the marks.
+    """
+    marks, face_of = sample_surface(mesh, num_samples, np.random.default_rng(seed))
+    return _distances(points, mesh, marks, face_of)
+
+
 def _distances(
     points: FloatArray, mesh: TriangleMesh, samples: FloatArray, face_of: IntArray
 ) -> FloatArray:

@@ -1,5 +1,5 @@
 """Posed scans -> one surface."""
 
-from scanweld.fusion.fuse import fuse
+from scanweld.fusion.fuse import fuse, voxel_edge
 
-__all__ = ["fuse"]
+__all__ = ["fuse", "voxel_edge"]

@@ -1,49 +1,55 @@
 """Colours of a fused mesh, blended from the scans that saw each vertex."""
 
+import logging
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from scanweld.fusion.posed_image import PosedImage, look_up
+from scanweld.fusion.posed_image import PosedImage, SingleArray
+from scanweld.fusion.sampling import sample_colors
+from scanweld.fusion.support import weights_at
 from scanweld.geometry.arrays import ByteArray, FloatArray
-from scanweld.geometry.prepared import PreparedScan
 
-_NUM_NEIGHBOURS = 3
+logger = logging.getLogger(__name__)
+
 _UNSEEN = 128.0
 """Grey of a mesh where scans have colours but none reaches it."""
+_NUM_COMPARED = 20_000
+"""Vertices at which the scans' exposures are compared, about."""
+_MIN_COMMON = 50
+"""Vertices that a pair of scans must share to be compared."""
+_MIN_FAIR = 0.1
+"""So large a share of them must be neither too dark nor too bright."""
+_DARK, _BRIGHT = 12.0, 243.0
+"""Outside of these a sensor's response says little of its exposure."""
+_RIDGE = 1e-3
+"""Share of a scan's comparisons that the wish to leave it as it is weighs."""
 
 
 def blend_colors(
-    vertices: FloatArray,
-    normals: FloatArray,
-    scans: Sequence[PreparedScan],
-    images: Sequence[PosedImage],
-    reach: float,
+    vertices: FloatArray, normals: FloatArray, images: Sequence[PosedImage], reach: float
 ) -> ByteArray | None:
     """Colours (V, 3) of vertices (V, 3) with unit normals (V, 3); None if no scan has colours.
 
-    A scan's colour at a vertex is that of its nearest points; scans weigh as they do in the volume.
-    Vertices that no scan with colours saw get the colour of the nearest vertex that has one.
+    Scans weigh as they do in the volume, after their exposures have been balanced. Vertices that no
+    scan with colours saw get the colour of the nearest vertex that has one.
 
     Args:
         vertices: World frame.
         normals: Unit, pointing out.
-        scans: With or without colours.
-        images: The scans' range images at their poses.
-        reach: How far from a vertex a scan's points may lie, in the scans' unit.
+        images: With or without colours.
+        reach: How far from a vertex a scan's surface may lie, in the scans' unit.
     """
-    if all(scan.scan.colors is None for scan in scans):
+    colored = [image for image in images if image.colors is not None]
+    if not colored:
         return None
+    gains = exposure_gains(vertices, normals, colored, reach)
     total, weight = np.zeros((len(vertices), 3)), np.zeros(len(vertices))
-    for scan, image in zip(scans, images, strict=True):
-        if scan.scan.colors is None:
-            continue
-        world_from_scan = (scan.scan_from_sensor @ image.sensor_from_world).inverse()
-        points = world_from_scan.apply(scan.scan.points)
-        color, share = _nearest_colors(points, scan.scan.colors, vertices, reach)
-        share *= _weights_of(image, vertices, normals)
-        total += share[:, None] * color
+    for image, gain in zip(colored, gains, strict=True):
+        color, share = _colors_at(image, vertices, normals, reach)
+        total += share[:, None] * color / gain
         weight += share
     has_color = weight > 0
     color = np.full((len(vertices), 3), _UNSEEN)
@@ -54,24 +60,52 @@ def blend_colors(
     return np.clip(np.rint(color), 0, 255).astype(np.uint8)
 
 
-def _nearest_colors(
-    points: FloatArray, colors: ByteArray, vertices: FloatArray, reach: float
-) -> tuple[FloatArray, FloatArray]:
-    """Colours (V, 3) of the points nearest to vertices, and 1 where there are any, else 0."""
-    tree = KDTree(points)
-    distance, index = tree.query(vertices, k=_NUM_NEIGHBOURS, distance_upper_bound=reach)
-    near = np.isfinite(distance)
-    share = np.where(near, 1.0 / (np.where(near, distance, 0.0) + 0.1 * reach), 0.0)
-    nearest = colors[np.where(near, index, 0)].astype(np.float64)
-    total = share.sum(axis=1)
-    blended = np.einsum("vk,vkc->vc", share, nearest) / np.where(total > 0, total, 1.0)[:, None]
-    return blended, (total > 0).astype(np.float64)
+def exposure_gains(
+    vertices: FloatArray, normals: FloatArray, images: Sequence[PosedImage], reach: float
+) -> FloatArray:
+    """How much brighter (N, 3) each scan shows red, green and blue than the scans together do.
+
+    A gain times the stored value is a gain of the light as well, whatever the gamma. Ratios of all
+    pairs where both saw the same surface, their medians, give the gains by least squares; their
+    geometric mean over the scans is 1.
+    """
+    step = max(1, len(vertices) // _NUM_COMPARED)
+    vertices, normals = vertices[::step], normals[::step]
+    found = [_colors_at(image, vertices, normals, reach) for image in images]
+    seen = [share > 0 for _, share in found]
+    logs = [_log_colors(color, share) for color, share in found]
+    size = len(images)
+    system, wanted = np.zeros((3, size, size)), np.zeros((3, size))
+    for i, j in combinations(range(size), 2):
+        for channel in range(3):
+            difference = logs[i][:, channel] - logs[j][:, channel]
+            num_common = int((seen[i] & seen[j]).sum())
+            difference = difference[np.isfinite(difference)]
+            if len(difference) < max(_MIN_COMMON, _MIN_FAIR * num_common):
+                continue
+            n = float(len(difference))
+            pair = np.ix_([i, j], [i, j])
+            system[channel][pair] += n * np.array([[1.0, -1.0], [-1.0, 1.0]])
+            wanted[channel][[i, j]] += n * float(np.median(difference)) * np.array([1.0, -1.0])
+    gains = np.zeros((size, 3))
+    for channel in range(3):
+        ridge = _RIDGE * np.trace(system[channel]) / size + 1.0
+        solved = np.linalg.solve(system[channel] + ridge * np.eye(size), wanted[channel])
+        gains[:, channel] = solved - solved.mean()
+    logger.debug("exposures: %s", np.round(np.exp(gains.mean(axis=1)), 3))
+    return np.exp(gains)
 
 
-def _weights_of(image: PosedImage, vertices: FloatArray, normals: FloatArray) -> FloatArray:
-    """Weights (V,) of an image's pixels at vertices, times the cosine of their own incidence."""
-    seen = image.sensor_from_world.apply(vertices)
-    weight = look_up(image.weight, image.camera, seen)
-    rays = image.camera.view_directions(seen)
-    cosine = -np.einsum("vk,vk->v", image.sensor_from_world.turn(normals), rays)
-    return weight * np.maximum(cosine, 0.0)
+def _log_colors(color: FloatArray, share: SingleArray) -> FloatArray:
+    """Logarithms (V, 3) of colours, NaN where a scan says nothing of them."""
+    fair = (share > 0)[:, None] & (color > _DARK) & (color < _BRIGHT)
+    return np.log(color, out=np.full(color.shape, np.nan), where=fair)
+
+
+def _colors_at(
+    image: PosedImage, vertices: FloatArray, normals: FloatArray, reach: float
+) -> tuple[FloatArray, SingleArray]:
+    distance, weight = weights_at(image, vertices, normals)
+    color, _ = sample_colors(image, vertices)
+    near = np.abs(distance) < reach
+    return color.astype(np.float64), np.where(near, weight, np.float32(0))

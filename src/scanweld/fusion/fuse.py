@@ -2,39 +2,68 @@
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from scanweld.config import FusionConfig
+from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.fusion.color import blend_colors
-from scanweld.fusion.posed_image import PosedImage, pose_images
-from scanweld.fusion.surface import drop_small_pieces, extract_surface
-from scanweld.fusion.volume import integrate
-from scanweld.geometry.mesh import TriangleMesh, vertex_normals
+from scanweld.fusion.finish import (
+    chosen_pieces,
+    close_pinholes,
+    decimated,
+    smoothed,
+    split_fans,
+)
+from scanweld.fusion.holes import closed_field
+from scanweld.fusion.noise import with_noise
+from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
+from scanweld.fusion.sheets import without_second_sheets
+from scanweld.fusion.support import measure_support
+from scanweld.fusion.surface import extract_surface, vertex_flags
+from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
+from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.geometry.scan import principal_diameter
+from scanweld.parallel import map_in_order
+from scanweld.prepare.range_image import natural_pixel
 
 logger = logging.getLogger(__name__)
 
 _MIN_PIXELS = 10
 """Surface pixels of all scans together, at least."""
+_FINE_SHARE = 0.25
+"""Voxels are as fine as this share of the scans: coarser ones must not blur what these saw."""
+_PINHOLE_VOXELS = 12.0
+"""Holes with so short a border come from single cells, whose corners no scan measured all."""
+_FILLED_ROUNDS = 20
+"""Smoothing of what closes holes: the space that was seen empty has steps."""
+_NORMAL_ROUNDS = 1
+"""Slivers among the triangles would turn the normals of their corners."""
 
 
 def fuse(
-    scans: Sequence[PreparedScan], world_from_sensor: Sequence[Pose], config: FusionConfig
+    scans: Sequence[PreparedScan],
+    world_from_sensor: Sequence[Pose],
+    config: FusionConfig,
+    *,
+    prepare: PrepareConfig | None = None,
+    workers: int = 1,
 ) -> TriangleMesh:
     """Fuse posed scans into one mesh, trimmed to what they saw.
 
     Args:
-        scans: Prepared scans of one object; their order matters to the last bits only.
+        scans: Prepared scans of one object; their order does not matter.
         world_from_sensor: A pose for each.
         config: Settings.
+        prepare: Settings that the scans were prepared with; the defaults if not given.
+        workers: Threads; the result is the same for any number.
 
     Returns:
-        The mesh in the world frame with unit normals that point out, and with colours if one of the
-        scans has them. Parts that no scan saw are left open.
+        The mesh in the world frame with unit normals that point out, the support and the standard
+        deviation of each vertex, and with colours if one of the scans has them.
 
     Raises:
         InputError: If the scans hold no surface to fuse, or lie too far apart.
@@ -42,26 +71,124 @@ def fuse(
     """
     if len(scans) != len(world_from_sensor):
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
-    images = pose_images(scans, world_from_sensor)
-    voxel = _voxel_size(scans, images, config)
-    volume = integrate(images, voxel, config.truncation_voxels * voxel)
+    if sum(len(scan.mesh.vertices) for scan in scans) < _MIN_PIXELS:
+        raise InputError("the scans hold no surface that could be fused")
+    images = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), workers)
+    voxel = voxel_edge(scans, config)
+    depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
+    truncation = max(config.truncation_voxels * voxel, 2.0 * depth)
+    volume = integrate(images, voxel, truncation, depth, workers)
     logger.debug("%d blocks of voxels of %.4g", len(volume.blocks), voxel)
-    vertices, faces = drop_small_pieces(*extract_surface(volume), voxel)
+    vertices, faces, filled = _surface(volume, images, depth, config, workers)
     if not len(faces):
         raise InputError("the posed scans hold no surface that could be fused; see their poses")
-    normals = vertex_normals(vertices, faces)
-    reach = max(2.0 * voxel, *(2.0 * scan.resolution for scan in scans))
-    colors = blend_colors(vertices, normals, scans, images, reach)
+    vertices = smoothed(vertices, faces, config.smooth)
+    if config.faces is not None:
+        vertices, faces, filled = decimated(vertices, faces, filled, config.faces)
     logger.debug("fused %d scans into %d faces", len(scans), len(faces))
-    return TriangleMesh(vertices=vertices, faces=faces, normals=normals, colors=colors)
+    return _dressed(vertices, faces, filled, images, voxel)
 
 
-def _voxel_size(
-    scans: Sequence[PreparedScan], images: Sequence[PosedImage], config: FusionConfig
-) -> float:
-    surfaces = [image.points[image.weight > 0] for image in images]
-    if sum(map(len, surfaces)) < _MIN_PIXELS:
-        raise InputError("the scans hold no surface that could be fused")
-    diameter = principal_diameter(np.concatenate(surfaces))
-    resolution = float(np.median([scan.resolution for scan in scans]))
-    return max(config.voxel_resolutions * resolution, diameter / config.max_voxels_across)
+def _images(
+    scans: Sequence[PreparedScan],
+    world_from_sensor: Sequence[Pose],
+    config: FusionConfig,
+    prepare: PrepareConfig,
+    workers: int,
+) -> list[PosedImage]:
+    """The scans' images at full resolution, in an order of their own."""
+    posed = sorted(
+        zip(scans, world_from_sensor, strict=True),
+        key=lambda both: (both[0].content_hash, both[1].matrix().tobytes()),
+    )
+    pixels = _pixels([scan for scan, _ in posed], config)
+    images = list(
+        map_in_order(
+            lambda k: pose_image(*posed[k], pixels[k], prepare),
+            range(len(posed)),
+            workers,
+        )
+    )
+    trusts = free_space_trusts(images)
+    return with_noise(
+        [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)]
+    )
+
+
+def voxel_edge(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
+    """Edge of the voxels that scans are fused in, in their unit."""
+    pairs = zip(_pixels(scans, config), scans, strict=True)
+    footprints = [min(pixel, scan.image.pixel) for pixel, scan in pairs]
+    resolution = float(np.quantile(footprints, _FINE_SHARE))
+    return max(config.voxel_resolutions * resolution, _finest(scans, config))
+
+
+def _pixels(scans: Sequence[PreparedScan], config: FusionConfig) -> list[float]:
+    """Footprints of the images' pixels: as fine as the scans, but no finer than voxels may be."""
+    finest = _finest(scans, config)
+    return [max(natural_pixel(scan.scan, scan.resolution), finest) for scan in scans]
+
+
+def _finest(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
+    return max(scan.diameter for scan in scans) / config.max_voxels_across
+
+
+def _surface(
+    volume: Volume,
+    images: Sequence[PosedImage],
+    depth: float,
+    config: FusionConfig,
+    workers: int,
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Vertices, faces, and which of the vertices were not measured."""
+    closing = config.holes
+    if closing == "open" and config.watertight:
+        closing = "fill"
+    if closing == "open":
+        vertices, faces = extract_surface(volume)
+        vertices, faces = _seen_part(vertices, faces, images, volume.voxel)
+        filled = np.zeros(len(vertices), dtype=bool)
+    else:
+        field = closed_field(volume, images, closing, depth, workers)
+        vertices, faces = extract_surface(field.volume, field.distance)
+        filled = ~vertex_flags(field.volume, field.is_measured, vertices)
+    faces, parts = split_fans(faces)
+    vertices, faces, filled = chosen_pieces(
+        vertices[parts], faces, filled[parts], volume.voxel, config.component
+    )
+    vertices, faces, filled = close_pinholes(
+        vertices, faces, filled, _PINHOLE_VOXELS * volume.voxel
+    )
+    return smoothed(vertices, faces, _FILLED_ROUNDS, filled), faces, filled
+
+
+def _seen_part(
+    vertices: FloatArray, faces: IntArray, images: Sequence[PosedImage], voxel: float
+) -> tuple[FloatArray, IntArray]:
+    """What was seen of the surface, without what lies between and beyond, as a manifold."""
+    normals = smoothed_normals(vertices, faces, _NORMAL_ROUNDS)
+    support = measure_support(images, vertices, normals, voxel)
+    faces = faces[(support.count > 0)[faces].all(axis=1)]
+    return without_second_sheets(vertices, faces, support, voxel)
+
+
+def _dressed(
+    vertices: FloatArray,
+    faces: IntArray,
+    filled: BoolArray,
+    images: Sequence[PosedImage],
+    voxel: float,
+) -> TriangleMesh:
+    """The mesh with what is known of each vertex."""
+    normals = smoothed_normals(vertices, faces, _NORMAL_ROUNDS)
+    support = measure_support(images, vertices, normals, voxel)
+    filled = filled | (support.count == 0)
+    return TriangleMesh(
+        vertices=vertices,
+        faces=faces,
+        normals=normals,
+        colors=blend_colors(vertices, normals, images, 2.0 * voxel),
+        support=np.where(filled, 0, support.count),
+        stdev=np.where(filled, np.nan, support.stdev),
+        filled=filled,
+    )

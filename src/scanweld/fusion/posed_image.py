@@ -1,76 +1,123 @@
-"""What a posed scan says to the volume: surface points with weights, and rays that went on."""
+"""What a posed scan says to the volume: its surface with weights, and rays that went on."""
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.config import PrepareConfig
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.prepared import PixelKind, PreparedScan, RangeImage
+from scanweld.geometry.prepared import PixelKind, PreparedScan
+from scanweld.prepare.prepare import surface_points
+from scanweld.prepare.range_image import normals_image, render_surface, rim_pixels
 
 logger = logging.getLogger(__name__)
+
+SingleArray = NDArray[np.float32]
 
 _RIM_WEIGHT = 0.05
 """Weight of a pixel on the rim, where sensors mix near and far."""
 _RAMP_PIXELS = 6.0
 """Distance from the rim at which a pixel has its full weight."""
 _FREE_PIXELS = 10.0
-"""Free pixels nearer to the silhouette do not carve."""
+"""Free pixels of the working image nearer to the silhouette do not carve."""
 _MAX_LOST = 0.02
 """An image on whose free pixels lies this share of another scan's surface does not carve there."""
 _NUM_TRUST_POINTS = 2000
 """Points of a scan by which the others' free pixels are judged, about."""
 _MIN_COSINE = 0.1
 """Pixels seen more obliquely than this have no say."""
+_MARGIN_PIXELS = 2.0
+_MAX_NOISE_PIXELS = 0.5
+"""Noisier depth is smoothed in each scan; else the mean of the scans blurs less."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class PosedImage:
-    """A posed range image of (H, W) pixels, ready for compiled kernels.
+    """A posed range image of (H, W) pixels, in the sensor frame, ready for compiled kernels.
 
     Attributes:
         camera: Pinhole or orthographic.
         sensor_from_world: Where the sensor stood.
-        points: (H, W, 3), world frame; NaN where there is no surface.
-        normals: (H, W, 3) unit, world frame, towards the sensor; NaN where there is no surface.
+        depth: (H, W); NaN where there is no surface.
+        normals: (H, W, 3) unit, towards the sensor; NaN where there is no surface.
         weight: (H, W) in [0, 1]: cosine of incidence, less towards the rim; 0 off the surface.
-        carving: (H, W) in [0, 1]: how far the ray speaks for the space before the surface, or on a
-            free pixel all along it, being empty.
         is_rim: (H, W) pixels next to a jump, a hole, the silhouette or the image's edge.
+        pixel: Footprint of a pixel on the object.
+        colors: (H, W, 3) as measured, black off the surface; or None.
+        free_camera: Of the image below.
+        is_free: (h, w) pixels of the working image that saw past the object.
+        trust: How far they are believed, from 0 to 1.
+        noise: Standard deviation of the surface's distance between pixels, along its normal.
+        precision: What the scan's weights are multiplied by, about 1.
     """
 
     camera: Camera
     sensor_from_world: Pose
-    points: FloatArray
-    normals: FloatArray
-    weight: FloatArray
-    carving: FloatArray
+    depth: SingleArray
+    normals: SingleArray
+    weight: SingleArray
     is_rim: BoolArray
+    pixel: float
+    colors: ByteArray | None
+    free_camera: Camera
+    is_free: BoolArray
+    trust: float = 1.0
+    noise: float = 0.0
+    precision: float = 1.0
+
+    def points(self) -> FloatArray:
+        """(N, 3) points of the surface that have a weight, world frame."""
+        local = self.camera.unproject_image(self.depth.astype(np.float64))[self.weight > 0]
+        return self.sensor_from_world.inverse().apply(local)
 
 
-def pose_images(
-    scans: Sequence[PreparedScan], world_from_sensor: Sequence[Pose]
-) -> list[PosedImage]:
-    """The range images of prepared scans at their poses."""
-    posed = zip(scans, world_from_sensor, strict=True)
-    images = [_pose_image(scan.image, pose) for scan, pose in posed]
-    free = [
-        (scan.image.kind == PixelKind.FREE) & (scan.image.outside > _FREE_PIXELS * scan.image.pixel)
-        for scan in scans
-    ]
-    trusts = free_space_trusts(images, free)
-    return [
-        replace(image, carving=np.where(is_free, trust, image.carving))
-        for image, is_free, trust in zip(images, free, trusts, strict=True)
-    ]
+def pose_image(
+    scan: PreparedScan, world_from_sensor: Pose, pixel: float, config: PrepareConfig
+) -> PosedImage:
+    """The range image of a prepared scan at its pose.
+
+    Args:
+        scan: The scan.
+        world_from_sensor: Its pose.
+        pixel: Footprint of the image's pixels, unless those of the working image are finer.
+        config: Settings of the scan's preparation.
+    """
+    coarse = scan.image
+    kept, points = surface_points(scan)
+    spacing, pixel = pixel, min(pixel, coarse.pixel)
+    margin = _MARGIN_PIXELS * pixel
+    camera, depth, mesh = render_surface(
+        kept, points, spacing, pixel, margin, config, _MAX_NOISE_PIXELS
+    )
+    normals = normals_image(depth, mesh)
+    is_rim = rim_pixels(depth, mesh, config.rim_pixels)
+    is_rim[[0, -1], :] = True
+    is_rim[:, [0, -1]] = True
+    colors = None
+    if kept.colors is not None:
+        max_step = config.jump_pixels * pixel
+        colors = _color_image(points, kept.colors, camera, depth, max_step)
+    return PosedImage(
+        camera=camera,
+        sensor_from_world=world_from_sensor.inverse(),
+        depth=depth.astype(np.float32),
+        normals=normals.astype(np.float32),
+        weight=_weights(camera, depth, normals, is_rim),
+        is_rim=is_rim,
+        pixel=pixel,
+        colors=colors,
+        free_camera=coarse.camera,
+        is_free=(coarse.kind == PixelKind.FREE) & (coarse.outside > _FREE_PIXELS * coarse.pixel),
+    )
 
 
-def free_space_trusts(images: Sequence[PosedImage], free: Sequence[BoolArray]) -> FloatArray:
+def free_space_trusts(images: Sequence[PosedImage]) -> FloatArray:
     """How far (N,) images are to be believed where they saw nothing, from 0 to 1.
 
     A pixel without a return is empty space for an ideal sensor only: a real one loses dark, oblique
@@ -78,9 +125,9 @@ def free_space_trusts(images: Sequence[PosedImage], free: Sequence[BoolArray]) -
     """
     points = [_sparse(image) for image in images]
     trusts = np.ones(len(images))
-    for j, (image, is_free) in enumerate(zip(images, free, strict=True)):
+    for j, image in enumerate(images):
         seen = [image.sensor_from_world.apply(p) for p in points if len(p)]
-        lost = [look_up(is_free, image.camera, p).mean() for p in seen]
+        lost = [look_up(image.is_free, image.free_camera, p).mean() for p in seen]
         trusts[j] = max(0.0, 1.0 - max(lost, default=0.0) / _MAX_LOST)
     logger.debug("trust in free space: %s", np.round(trusts, 2))
     return trusts
@@ -99,38 +146,45 @@ def look_up(values: NDArray, camera: Camera, points: FloatArray) -> NDArray:
 
 def _sparse(image: PosedImage) -> FloatArray:
     """Some surface points (P, 3), off the rims, world frame."""
-    points = image.points[(image.weight > 0) & ~image.is_rim]
-    return points[:: max(1, len(points) // _NUM_TRUST_POINTS)]
+    chosen = np.flatnonzero((image.weight > 0) & ~image.is_rim)
+    chosen = chosen[:: max(1, len(chosen) // _NUM_TRUST_POINTS)]
+    row, column = np.divmod(chosen, image.camera.width)
+    pixels = np.stack([column, row], axis=1).astype(np.float64)
+    depth = image.depth[row, column].astype(np.float64)
+    return image.sensor_from_world.inverse().apply(image.camera.unproject(pixels, depth))
 
 
-def _pose_image(image: RangeImage, world_from_sensor: Pose) -> PosedImage:
-    points = image.points()
-    weight = _weights(image, points)
-    is_rim = _rim(image)
-    return PosedImage(
-        camera=image.camera,
-        sensor_from_world=world_from_sensor.inverse(),
-        points=world_from_sensor.apply(points),
-        normals=world_from_sensor.turn(image.normals),
-        weight=weight,
-        carving=np.where(is_rim, 0.0, weight),
-        is_rim=is_rim,
-    )
-
-
-def _weights(image: RangeImage, points: FloatArray) -> FloatArray:
+def _weights(
+    camera: Camera, depth: FloatArray, normals: FloatArray, is_rim: BoolArray
+) -> SingleArray:
     """(H, W) cosine of incidence times a ramp that rises from the rim; 0 off the surface."""
-    rays = image.camera.view_directions(points)
-    cosine = -np.einsum("hwk,hwk->hw", image.normals, rays)
-    is_surface = (image.kind == PixelKind.SURFACE) & (cosine > _MIN_COSINE)
-    inner = np.pad(is_surface & ~image.is_rim, 1)
-    depth = np.asarray(distance_transform_edt(inner))[1:-1, 1:-1]
-    ramp = _RIM_WEIGHT + (1 - _RIM_WEIGHT) * np.minimum(depth / _RAMP_PIXELS, 1.0)
-    return np.where(is_surface, cosine * ramp, 0.0)
+    rays = camera.view_directions(camera.unproject_image(depth))
+    cosine = -np.einsum("hwk,hwk->hw", normals, rays)
+    is_surface = np.isfinite(depth) & (cosine > _MIN_COSINE)
+    inner = np.pad(is_surface & ~is_rim, 1)
+    inward = np.asarray(distance_transform_edt(inner))[1:-1, 1:-1]
+    ramp = _RIM_WEIGHT + (1 - _RIM_WEIGHT) * np.minimum(inward / _RAMP_PIXELS, 1.0)
+    return np.where(is_surface, cosine * ramp, 0.0).astype(np.float32)
 
 
-def _rim(image: RangeImage) -> BoolArray:
-    is_rim = np.array(image.is_rim)
-    is_rim[[0, -1], :] = True
-    is_rim[:, [0, -1]] = True
-    return is_rim
+def _color_image(
+    points: FloatArray, colors: ByteArray, camera: Camera, depth: FloatArray, max_step: float
+) -> ByteArray:
+    """Colours (H, W, 3): of the point nearest to the pixel's centre, else of the nearest pixel."""
+    pixels, z = camera.project(points)
+    column, row = np.rint(pixels).astype(np.int64).T
+    inside = (row >= 0) & (row < camera.height) & (column >= 0) & (column < camera.width)
+    off_centre = np.abs(pixels - np.rint(pixels)).max(axis=1)
+    index = np.flatnonzero(inside)
+    index = index[np.abs(depth[row[index], column[index]] - z[index]) <= max_step]
+    index = index[np.argsort(-off_centre[index], kind="stable")]
+    image = np.zeros((camera.height, camera.width, 3), np.uint8)
+    has_color = np.zeros((camera.height, camera.width), dtype=bool)
+    # Where several points fall into a pixel, the last one written is the nearest.
+    image[row[index], column[index]] = colors[index]
+    has_color[row[index], column[index]] = True
+    if has_color.any():
+        nearest = distance_transform_edt(~has_color, return_distances=False, return_indices=True)
+        image = image[tuple(np.asarray(nearest))]
+    image[~np.isfinite(depth)] = 0
+    return image

@@ -1,48 +1,52 @@
-"""From signed distances to triangles: extraction where the volume was seen, and cleaning."""
-
-import logging
+"""From signed distances to triangles, where there are distances."""
 
 import numpy as np
 
 from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
-from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume, VoxelArray
-from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.mesh import compact, face_normals, pieces
-
-logger = logging.getLogger(__name__)
+from scanweld.fusion.posed_image import SingleArray
+from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume
+from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 _CHUNK = 4096
 """Blocks that are looked at together; bounds the memory."""
 _MIN_STEP = 0.02
 """Vertices keep this share of a voxel's edge away from its ends: no triangle shrinks to nothing."""
-_MIN_PIECE_VOXELS = 50.0
-_MIN_PIECE_SHARE = 2e-3
-"""Pieces with less area than so many squared voxels, or this share of all area, are dropped."""
 
 
-def extract_surface(volume: Volume) -> tuple[FloatArray, IntArray]:
-    """Marching cubes over the cells whose eight corners were all seen.
+def extract_surface(
+    volume: Volume, distance: SingleArray | None = None
+) -> tuple[FloatArray, IntArray]:
+    """Marching cubes over the cells whose eight corners have a distance.
+
+    Args:
+        volume: Where the voxels are.
+        distance: (B, 8, 8, 8) of them, NaN where unknown; the mean distances if not given.
 
     Returns:
         Vertices (V, 3) in the world frame and faces (F, 3), counter-clockwise from outside. An edge
         has one face at the border of what was seen, two elsewhere.
     """
-    distance = volume.mean_distance()
-    edge_keys, values = [], []
+    distance = volume.mean_distance() if distance is None else distance
+    found: list[tuple[IntArray, FloatArray]] = []
+    corners: list[IntArray] = []
+    num_found = 0
     for start in range(0, len(volume.blocks), _CHUNK):
         index = np.arange(start, min(start + _CHUNK, len(volume.blocks)))
         keys, ends = _cell_edges(volume, distance, index)
-        edge_keys.append(keys)
-        values.append(ends)
+        keys, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+        found.append((keys, ends[first]))
+        corners.append(inverse.reshape(-1) + num_found)
+        num_found += len(keys)
     keys, first, inverse = np.unique(
-        np.concatenate(edge_keys), return_index=True, return_inverse=True
+        np.concatenate([keys for keys, _ in found]), return_index=True, return_inverse=True
     )
-    vertices = _vertices(volume, keys, np.concatenate(values)[first])
-    return vertices, inverse.reshape(-1, 3)
+    vertices = _vertices(volume, keys, np.concatenate([ends for _, ends in found])[first])
+    faces = inverse.reshape(-1)[np.concatenate(corners)].reshape(-1, 3)
+    return vertices, faces.astype(np.int64)
 
 
 def _cell_edges(
-    volume: Volume, distance: VoxelArray, index: IntArray
+    volume: Volume, distance: SingleArray, index: IntArray
 ) -> tuple[IntArray, FloatArray]:
     """Edges crossed by the surface, three a triangle, with the values at both of their ends.
 
@@ -66,7 +70,7 @@ def _cell_edges(
     return 3 * keys + edge // 4, values[row[:, None], ends].astype(np.float64)
 
 
-def _with_neighbours(volume: Volume, distance: VoxelArray, index: IntArray) -> VoxelArray:
+def _with_neighbours(volume: Volume, distance: SingleArray, index: IntArray) -> SingleArray:
     """(N, 9, 9, 9) distances of blocks and of the next voxels; NaN where unseen."""
     padded = np.full((len(index), BLOCK + 1, BLOCK + 1, BLOCK + 1), np.nan, np.float32)
     for shift in corner_offsets():
@@ -87,17 +91,24 @@ def _vertices(volume: Volume, keys: IntArray, values: FloatArray) -> FloatArray:
     return volume.origin + volume.voxel * (base + step[:, None] * np.eye(3)[axis])
 
 
-def drop_small_pieces(
-    vertices: FloatArray, faces: IntArray, voxel: float
-) -> tuple[FloatArray, IntArray]:
-    """The mesh without the connected pieces too small to be trusted; the largest always stays."""
-    if not len(faces):
-        return vertices, faces
-    piece = pieces(faces, len(vertices))[faces[:, 0]]
-    face_area = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
-    area = np.bincount(piece, weights=face_area)
-    min_area = max(_MIN_PIECE_VOXELS * voxel**2, _MIN_PIECE_SHARE * float(area.sum()))
-    stays = (area >= min_area) | (np.arange(len(area)) == np.argmax(area))
-    logger.debug("%d of %d pieces stay", stays.sum(), len(area))
-    kept, kept_faces, _ = compact(vertices, faces[stays[piece]])
-    return kept, kept_faces
+def vertex_flags(volume: Volume, flags: BoolArray, vertices: FloatArray) -> BoolArray:
+    """Whether both voxels at the ends of the edge that a vertex lies on have a flag.
+
+    Args:
+        volume: Where the voxels are.
+        flags: (B, 8, 8, 8) of them.
+        vertices: (V, 3) as ``extract_surface`` gives them.
+
+    Returns:
+        (V,), False where a block is not kept.
+    """
+    where = (vertices - volume.origin) / volume.voxel
+    low = np.floor(where + 0.5 * _MIN_STEP).astype(np.int64)
+    axis = np.argmax(where - low, axis=1)
+    high = low + np.eye(3, dtype=np.int64)[axis]
+    both = np.ones(len(vertices), dtype=bool)
+    for end in (low, high):
+        block = volume.find(end // BLOCK)
+        i, j, k = (end % BLOCK).T
+        both &= (block >= 0) & flags[block, i, j, k]
+    return both

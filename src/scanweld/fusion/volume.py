@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from scanweld.errors import InputError
-from scanweld.fusion.posed_image import PosedImage
+from scanweld.fusion.posed_image import PosedImage, SingleArray
+from scanweld.fusion.sampling import plane_distance, project, smooth_distance
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-
-VoxelArray = NDArray[np.float32]
+from scanweld.parallel import map_in_order
 
 BLOCK = 8
 """Voxels along the edge of a block."""
@@ -23,8 +22,20 @@ KEY_BITS = 20
 """Voxel and block coordinates are below 2^20, so that three of them fit into one number."""
 _CARVE_RATIO = 1.0
 """A voxel is empty where free space weighs more than this share of its surface's weight."""
-_DEPTH_VOXELS = 2.0
-"""Weights fall to nothing this far behind a surface: no cell that it crosses reaches deeper."""
+_MARGIN_BLOCKS = 8
+"""Coordinates that stay free below the lowest block: holes may be closed there."""
+DEPTH_VOXELS = 1.5
+DEPTH_SIGMAS = 3.0
+"""Weights fall to nothing this far behind a surface, where the other side of a wall may be."""
+_PINHOLE_ROUNDS = 2
+_MIN_DEEP_VOXELS = 0.7
+"""Voxels so far behind the surface are deep inside."""
+MIN_EMPTY = 0.3
+"""Sum of the weights of rays that tells that a voxel without a surface is empty."""
+_MAX_STEP_VOXELS = 2.5
+"""Distances two voxels apart that differ by more are not of one surface."""
+_CHUNK = 512
+"""Blocks that a worker takes at a time."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -48,179 +59,248 @@ class Volume:
     truncation: float
     blocks: IntArray
     keys: IntArray
-    distance: VoxelArray
-    weight: VoxelArray
-    empty: VoxelArray
+    distance: SingleArray
+    weight: SingleArray
+    empty: SingleArray
 
-    def mean_distance(self) -> VoxelArray:
+    def mean_distance(self) -> SingleArray:
         """(B, 8, 8, 8) signed distances over the truncation.
 
-        NaN where no surface was measured nearby, or where a voxel behind one is empty space.
+        NaN where no surface was measured nearby, or where a voxel behind one is empty space. Voxels
+        right behind one that is deep inside are inside too, and single ones between measured ones
+        are filled: they would be pinholes in the surface.
         """
         is_solid = self.empty <= _CARVE_RATIO * self.weight
         is_seen = (self.weight > 0) & ((self.distance >= 0) | is_solid)
         mean = np.full(self.weight.shape, np.nan, np.float32)
-        return np.divide(self.distance, self.weight, out=mean, where=is_seen)
+        np.divide(self.distance, self.weight, out=mean, where=is_seen)
+        nearby = self.neighbours()
+        for _ in range(_PINHOLE_ROUNDS):
+            filled = mean.copy()
+            _fill_pinholes(mean, self.empty, nearby, self.voxel / self.truncation, filled)
+            mean = filled
+        return mean
+
+    def neighbours(self) -> IntArray:
+        """(B, 6) blocks before and after along each axis, -1 for those not kept."""
+        steps = np.concatenate([[-row, row] for row in np.eye(3, dtype=np.int64)])
+        return np.stack([self.find(self.blocks + step) for step in steps], axis=1)
 
     def find(self, blocks: IntArray) -> IntArray:
         """Indices (N,) of blocks given by their coordinates (N, 3), -1 for those not kept."""
-        keys = _keys(blocks)
+        keys = block_keys(blocks)
         index = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
         return np.where(self.keys[index] == keys, index, -1)
 
 
-def integrate(images: Sequence[PosedImage], voxel: float, truncation: float) -> Volume:
+def integrate(
+    images: Sequence[PosedImage],
+    voxel: float,
+    truncation: float,
+    depth: float,
+    workers: int = 1,
+) -> Volume:
     """Fuse images into a volume of blocks that lie within the truncation of a surface point.
 
     Args:
         images: At least one; one of them with at least one surface pixel.
         voxel: Edge of a voxel, in the scans' unit.
         truncation: Likewise; twice the voxel or more.
+        depth: Likewise: how far behind a surface its weights fall to nothing. What is deep behind
+            one surface may be just before another, as in a thin wall.
+        workers: Threads; the result is the same for any number.
 
     Raises:
         InputError: If the scans are spread over more than a million voxels.
     """
     volume = _allocate(images, voxel, truncation)
-    for image in images:
-        _integrate_image(
-            volume.distance,
-            volume.weight,
-            volume.empty,
-            volume.blocks,
-            volume.origin,
-            voxel,
-            truncation,
-            image.sensor_from_world.matrix(),
-            image.camera.parameters,
-            image.points,
-            image.normals,
-            image.weight,
-            image.carving,
-            image.is_rim,
-        )
+    add_images(volume, images, depth, workers)
     return volume
 
 
-def _allocate(images: Sequence[PosedImage], voxel: float, truncation: float) -> Volume:
-    surfaces = [image.points[image.weight > 0] for image in images]
-    low = np.min([points.min(axis=0) for points in surfaces if len(points)], axis=0)
-    origin = low - truncation - voxel
-    high = np.max([points.max(axis=0) for points in surfaces if len(points)], axis=0)
-    if float((high - low).max()) / voxel > 0.9 * 2**KEY_BITS:
-        raise InputError("the posed scans lie too far apart to be fused; see their poses")
-    keys = np.unique(np.concatenate([_near(p - origin, voxel, truncation) for p in surfaces]))
-    mask = (1 << KEY_BITS) - 1
-    blocks = np.stack([keys >> (2 * KEY_BITS), (keys >> KEY_BITS) & mask, keys & mask], axis=-1)
-    shape = (len(keys), BLOCK, BLOCK, BLOCK)
+def add_images(
+    volume: Volume, images: Sequence[PosedImage], depth: float, workers: int = 1
+) -> None:
+    """Add images to the volume's sums, as ``integrate`` does."""
+
+    def work(start: int) -> None:
+        part = slice(start, start + _CHUNK)
+        for image in images:
+            _integrate_image(
+                volume.distance[part],
+                volume.weight[part],
+                volume.empty[part],
+                volume.blocks[part],
+                np.array([*volume.origin, volume.voxel, volume.truncation, depth]),
+                image.sensor_from_world.matrix(),
+                image.camera.parameters,
+                image.depth,
+                image.normals,
+                image.weight,
+                image.is_rim,
+                image.precision,
+                image.free_camera.parameters,
+                image.is_free,
+                image.trust,
+            )
+
+    for _ in map_in_order(work, range(0, len(volume.blocks), _CHUNK), workers):
+        pass
+
+
+def empty_volume(origin: FloatArray, voxel: float, truncation: float, blocks: IntArray) -> Volume:
+    """A volume of the given blocks (B, 3), sorted by their keys, that holds nothing yet."""
+    shape = (len(blocks), BLOCK, BLOCK, BLOCK)
     return Volume(
         origin=origin,
         voxel=voxel,
         truncation=truncation,
         blocks=blocks,
-        keys=keys,
+        keys=block_keys(blocks),
         distance=np.zeros(shape, np.float32),
         weight=np.zeros(shape, np.float32),
         empty=np.zeros(shape, np.float32),
     )
 
 
-def _near(points: FloatArray, voxel: float, truncation: float) -> IntArray:
-    """Keys of the blocks within the truncation, along each axis, of points from the origin."""
-    edge = BLOCK * voxel
-    steps = np.linspace(-truncation, truncation, int(np.ceil(2 * truncation / edge)) + 1)
-    along = [np.floor((points[:, a, None] + steps) / edge).astype(np.int64) for a in range(3)]
-    x, y, z = along[0][:, :, None, None], along[1][:, None, :, None], along[2][:, None, None, :]
-    return np.unique(_keys(np.stack(np.broadcast_arrays(x, y, z), axis=-1)))
+def merged(first: Volume, second: Volume) -> tuple[Volume, IntArray]:
+    """Two volumes of one layout without common blocks as one, and the order of their blocks."""
+    keys = np.concatenate([first.keys, second.keys])
+    order = np.argsort(keys)
+    volume = Volume(
+        origin=first.origin,
+        voxel=first.voxel,
+        truncation=first.truncation,
+        blocks=np.concatenate([first.blocks, second.blocks])[order],
+        keys=keys[order],
+        distance=np.concatenate([first.distance, second.distance])[order],
+        weight=np.concatenate([first.weight, second.weight])[order],
+        empty=np.concatenate([first.empty, second.empty])[order],
+    )
+    return volume, order
 
 
-def _keys(blocks: IntArray) -> IntArray:
+def block_keys(blocks: IntArray) -> IntArray:
+    """One number (N,) for the coordinates (N, 3) of each block."""
     x, y, z = blocks[..., 0], blocks[..., 1], blocks[..., 2]
     return (((x << KEY_BITS) | y) << KEY_BITS) | z
 
 
+def blocks_of(keys: IntArray) -> IntArray:
+    """Coordinates (N, 3) of the blocks with these keys (N,)."""
+    mask = (1 << KEY_BITS) - 1
+    return np.stack([keys >> (2 * KEY_BITS), (keys >> KEY_BITS) & mask, keys & mask], axis=-1)
+
+
+def _allocate(images: Sequence[PosedImage], voxel: float, truncation: float) -> Volume:
+    bounds = [(p.min(axis=0), p.max(axis=0)) for p in (i.points() for i in images) if len(p)]
+    low = np.min([low for low, _ in bounds], axis=0)
+    high = np.max([high for _, high in bounds], axis=0)
+    if float((high - low).max()) / voxel > 0.9 * 2**KEY_BITS:
+        raise InputError("the posed scans lie too far apart to be fused; see their poses")
+    origin = low - truncation - (1 + _MARGIN_BLOCKS * BLOCK) * voxel
+    keys = np.zeros(0, np.int64)
+    for image in images:
+        keys = np.union1d(keys, _near(image.points() - origin, voxel, truncation))
+    return empty_volume(origin, voxel, truncation, blocks_of(keys))
+
+
+def _near(points: FloatArray, voxel: float, truncation: float) -> IntArray:
+    """Keys of the blocks within the truncation, along each axis, of points from the origin."""
+    edge = BLOCK * voxel
+    # Most points of a block reach the same blocks: look at one for each voxel.
+    cells = np.floor(points / voxel).astype(np.int64)
+    _, first = np.unique(block_keys(cells), return_index=True)
+    centres = (cells[first] + 0.5) * voxel
+    reach = truncation + 0.5 * voxel
+    steps = np.linspace(-reach, reach, int(np.ceil(2 * reach / edge)) + 1)
+    along = [np.floor((centres[:, a, None] + steps) / edge).astype(np.int64) for a in range(3)]
+    x, y, z = along[0][:, :, None, None], along[1][:, None, :, None], along[2][:, None, None, :]
+    return np.unique(block_keys(np.stack(np.broadcast_arrays(x, y, z), axis=-1)))
+
+
 @njit(cache=True, nogil=True)
 def _integrate_image(
-    distance: VoxelArray,
-    weight: VoxelArray,
-    empty: VoxelArray,
+    distance: SingleArray,
+    weight: SingleArray,
+    empty: SingleArray,
     blocks: IntArray,
-    origin: FloatArray,
-    voxel: float,
-    truncation: float,
+    layout: FloatArray,
     sensor_from_world: FloatArray,
     camera: FloatArray,
-    points: FloatArray,
-    normals: FloatArray,
-    pixel_weight: FloatArray,
-    carving: FloatArray,
+    depth: SingleArray,
+    normals: SingleArray,
+    pixel_weight: SingleArray,
     is_rim: BoolArray,
+    precision: float,
+    free_camera: FloatArray,
+    is_free: BoolArray,
+    trust: float,
 ) -> None:  # pragma: no cover - compiled
-    """Add one image: all voxels of all blocks that project into it."""
-    m, size = sensor_from_world, distance.shape[1]
-    height, width = carving.shape
-    depth = _DEPTH_VOXELS * voxel / truncation
+    """Add one image: all voxels of all blocks that project into it.
+
+    The layout is the volume's origin, voxel and truncation, and the depth of weights.
+    """
+    m, size, voxel, truncation = sensor_from_world, distance.shape[1], layout[3], layout[4]
+    fade = layout[5] / truncation
+    height, width = depth.shape
     for block, i, j, k in np.ndindex(distance.shape):
-        x = origin[0] + voxel * (blocks[block, 0] * size + i)
-        y = origin[1] + voxel * (blocks[block, 1] * size + j)
-        z = origin[2] + voxel * (blocks[block, 2] * size + k)
-        a = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]
-        b = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]
-        if camera[0] == 0.0:
-            c = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3]
-            if c <= 0.0:
-                continue
-            a, b = a / c, b / c
-        u, v = camera[1] * a + camera[3], camera[2] * b + camera[4]
-        if not (-0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5):
+        wx = layout[0] + voxel * (blocks[block, 0] * size + i)
+        wy = layout[1] + voxel * (blocks[block, 1] * size + j)
+        wz = layout[2] + voxel * (blocks[block, 2] * size + k)
+        x = m[0, 0] * wx + m[0, 1] * wy + m[0, 2] * wz + m[0, 3]
+        y = m[1, 0] * wx + m[1, 1] * wy + m[1, 2] * wz + m[1, 3]
+        z = m[2, 0] * wx + m[2, 1] * wy + m[2, 2] * wz + m[2, 3]
+        u, v = project(camera, x, y, z)
+        w, row, column = 0.0, 0, 0
+        if -0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5:
+            row, column = int(v + 0.5), int(u + 0.5)
+            w = pixel_weight[row, column]
+        if not w > 0.0:
+            u, v = project(free_camera, x, y, z)
+            inside = -0.5 <= u < is_free.shape[1] - 0.5 and -0.5 <= v < is_free.shape[0] - 0.5
+            if inside and is_free[int(v + 0.5), int(u + 0.5)]:
+                empty[block, i, j, k] += trust
             continue
-        row, column = int(v + 0.5), int(u + 0.5)
-        w = pixel_weight[row, column]
-        d = np.inf
-        if w > 0.0:
-            d = _plane_distance(points, normals, row, column, x, y, z)
+        d = plane_distance(camera, depth, normals, row, column, x, y, z)
         if d > truncation:
-            empty[block, i, j, k] += carving[row, column]
-        elif d > -depth * truncation:
             if not is_rim[row, column]:
-                d, w = _smooth_distance(points, normals, pixel_weight, u, v, x, y, z)
+                empty[block, i, j, k] += w
+        elif d > -fade * truncation:
+            if not is_rim[row, column]:
+                d, w = smooth_distance(camera, depth, normals, pixel_weight, u, v, x, y, z)
             d = min(max(d / truncation, -1.0), 1.0)
-            # What is deep behind one surface may be just before another, as in a thin wall.
-            w *= min(1.0, max(0.0, (d + depth) / (0.75 * depth)))
+            w *= precision * min(1.0, max(0.0, (d + fade) / (0.75 * fade)))
             distance[block, i, j, k] += w * d
             weight[block, i, j, k] += w
 
 
 @njit(cache=True, nogil=True)
-def _plane_distance(
-    points: FloatArray, normals: FloatArray, row: int, column: int, x: float, y: float, z: float
-) -> float:  # pragma: no cover - compiled
-    """Distance of (x, y, z) to the tangent plane of a pixel, positive towards the sensor."""
-    p, n = points[row, column], normals[row, column]
-    return n[0] * (x - p[0]) + n[1] * (y - p[1]) + n[2] * (z - p[2])
-
-
-@njit(cache=True, nogil=True)
-def _smooth_distance(
-    points: FloatArray,
-    normals: FloatArray,
-    pixel_weight: FloatArray,
-    u: float,
-    v: float,
-    x: float,
-    y: float,
-    z: float,
-) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Distance and weight, bilinear over the tangent planes of the four pixels around (u, v).
-
-    The pixel nearest to (u, v) must not be on a rim, so that all four are of one surface.
-    """
-    row, column = int(v), int(u)
-    s, t = u - column, v - row
-    d, w = 0.0, 0.0
-    for k in range(4):
-        q, p = row + k // 2, column + k % 2
-        share = (t if k // 2 else 1.0 - t) * (s if k % 2 else 1.0 - s) * pixel_weight[q, p]
-        if share > 0.0:
-            d += share * _plane_distance(points, normals, q, p, x, y, z)
-            w += share
-    return d / w, w
+def _fill_pinholes(
+    mean: SingleArray, empty: SingleArray, nearby: IntArray, voxel: float, filled: SingleArray
+) -> None:  # pragma: no cover - compiled
+    """Give unknown voxels the mean of pairs of opposite neighbours, or of one deep inside."""
+    size = mean.shape[1]
+    pair = np.zeros(2)
+    for b, i, j, k in np.ndindex(mean.shape):
+        if not np.isnan(mean[b, i, j, k]):
+            continue
+        total, count, deepest = 0.0, 0, 0.0
+        for axis in range(3):
+            for side in range(2):
+                step = 2 * side - 1
+                x, y, z = i + step * (axis == 0), j + step * (axis == 1), k + step * (axis == 2)
+                block = b
+                if min(x, y, z) < 0 or max(x, y, z) >= size:
+                    block = nearby[b, 2 * axis + side]
+                    x, y, z = x % size, y % size, z % size
+                pair[side] = mean[block, x, y, z] if block >= 0 else np.nan
+                if pair[side] < deepest:
+                    deepest = pair[side]
+            if abs(pair[0] - pair[1]) <= _MAX_STEP_VOXELS * voxel:
+                total += 0.5 * (pair[0] + pair[1])
+                count += 1
+        if count > 0:
+            filled[b, i, j, k] = total / count
+        elif deepest < -_MIN_DEEP_VOXELS * voxel and empty[b, i, j, k] <= MIN_EMPTY:
+            filled[b, i, j, k] = deepest

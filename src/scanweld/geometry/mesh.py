@@ -18,6 +18,10 @@ class TriangleMesh:
         faces: (F, 3) vertex indices.
         normals: (V, 3) unit normals or None.
         colors: (V, 3) uint8 or None.
+        support: (V,) number of scans whose surface lies at each vertex, or None.
+        stdev: (V,) estimated standard deviation of each vertex along its normal, in the unit of
+            the mesh, NaN where no scan stands behind it; or None.
+        filled: (V,) whether no scan stands behind a vertex: it closes a hole; or None.
 
     Raises:
         ValueError: If the shapes do not fit, or a face names no vertex.
@@ -27,6 +31,9 @@ class TriangleMesh:
     faces: IntArray
     normals: FloatArray | None = None
     colors: ByteArray | None = None
+    support: IntArray | None = None
+    stdev: FloatArray | None = None
+    filled: BoolArray | None = None
 
     def __post_init__(self) -> None:
         put = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
@@ -39,6 +46,12 @@ class TriangleMesh:
             put("normals", frozen(self.normals, np.float64, (n, 3)))
         if self.colors is not None:
             put("colors", frozen(self.colors, np.uint8, (n, 3)))
+        if self.support is not None:
+            put("support", frozen(self.support, np.int64, (n,)))
+        if self.stdev is not None:
+            put("stdev", frozen(self.stdev, np.float64, (n,)))
+        if self.filled is not None:
+            put("filled", frozen(self.filled, np.bool_, (n,)))
 
 
 def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -60,14 +73,40 @@ def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
 
 
+def smoothed_normals(vertices: FloatArray, faces: IntArray, rounds: int) -> FloatArray:
+    """Unit vertex normals (V, 3), averaged over the faces around again and again, by area."""
+    normals = vertex_normals(vertices, faces)
+    area = np.linalg.norm(face_normals(vertices, faces), axis=1, keepdims=True)
+    for _ in range(rounds):
+        mean = area * normals[faces].sum(axis=1)
+        summed = np.stack(
+            [
+                sum(
+                    np.bincount(faces[:, k], weights=mean[:, axis], minlength=len(vertices))
+                    for k in range(3)
+                )
+                for axis in range(3)
+            ],
+            axis=1,
+        )
+        length = np.linalg.norm(summed, axis=1, keepdims=True)
+        normals = np.where(length > 0, summed / np.where(length > 0, length, 1.0), normals)
+    return normals
+
+
+def border_edges(faces: IntArray, num_vertices: int) -> tuple[IntArray, IntArray]:
+    """First and last vertices (B,) of the edges that only one face has, as it runs along them."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    keys = np.minimum(start, end) * num_vertices + np.maximum(start, end)
+    _, first, counts = np.unique(keys, return_index=True, return_counts=True)
+    once = first[counts == 1]
+    return start[once], end[once]
+
+
 def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
     """Which vertices (V,) lie on an edge that only one face has."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    keys, counts = np.unique(edges[:, 0] * num_vertices + edges[:, 1], return_counts=True)
-    once = keys[counts == 1]
     is_border = np.zeros(num_vertices, dtype=bool)
-    is_border[once // num_vertices] = True
-    is_border[once % num_vertices] = True
+    is_border[np.concatenate(border_edges(faces, num_vertices))] = True
     return is_border
 
 

@@ -59,7 +59,6 @@ def read_ply(path: Path, data: bytes) -> RawScan:
             f"{path}: the camera in its obj_info has {camera.width} x {camera.height} pixels, the "
             f"range grid {grid.shape[1]} x {grid.shape[0]} cells; correct either"
         )
-    confidence = _stack(vertex, ("confidence",))
     intensity = _bytes(path, element, vertex, ("intensity",))
     return RawScan(
         points=points,
@@ -68,7 +67,10 @@ def read_ply(path: Path, data: bytes) -> RawScan:
         normals=_stack(vertex, ("nx", "ny", "nz")),
         colors=_colors(path, element, vertex),
         intensity=None if intensity is None else intensity[:, 0],
-        confidence=None if confidence is None else confidence[:, 0],
+        confidence=_column(vertex, "confidence"),
+        support=_column(vertex, "support"),
+        stdev=_column(vertex, "stdev"),
+        filled=_column(vertex, "filled"),
         camera=camera,
         scan_from_sensor=_sensor_pose(header),
         notes=notes,
@@ -79,6 +81,12 @@ def _stack(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
     """Scalar columns side by side (N, k), or None if one is missing."""
     found = _scalars(columns, names)
     return None if found is None else _doubles(found)
+
+
+def _column(columns: Columns, name: str) -> FloatArray | None:
+    """A scalar column (N,), or None if it is missing."""
+    found = _stack(columns, (name,))
+    return None if found is None else found[:, 0]
 
 
 def _scalars(columns: Columns, names: tuple[str, ...]) -> list[NDArray] | None:

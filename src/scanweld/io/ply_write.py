@@ -1,5 +1,6 @@
 """Writing scans and meshes as binary little-endian PLY."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io.atomic import write_whole
 from scanweld.io.ply import CAMERA_KEY, POSE_KEY
 
-_TYPE_NAMES = {"<f4": "float", "<f8": "double", "|u1": "uchar"}
+_TYPE_NAMES = {"<f4": "float", "<f8": "double", "|u1": "uchar", "<i4": "int"}
 
 
 def write_scan_ply(path: Path | str, scan: RangeScan) -> None:
@@ -45,15 +46,40 @@ def write_scan_ply(path: Path | str, scan: RangeScan) -> None:
 
 
 def write_mesh_ply(path: Path | str, mesh: TriangleMesh) -> None:
-    """Write a mesh with its normals, rounded to single precision, and its colours.
+    """Write a mesh with its normals, rounded to single precision, its colours, and what is known.
+
+    The properties ``support``, ``stdev`` and ``filled`` are as in the mesh.
 
     Raises:
         WriteError: If the file cannot be written.
     """
     normals = None if mesh.normals is None else mesh.normals.astype(np.float32)
     vertex = _vertex_fields(mesh.vertices, normals, mesh.colors)
+    if mesh.support is not None:
+        vertex["support"] = mesh.support.astype("<i4")
+    if mesh.stdev is not None:
+        vertex["stdev"] = mesh.stdev.astype("<f4")
+    if mesh.filled is not None:
+        vertex["filled"] = mesh.filled.astype("|u1")
     elements = [_scalar_element("vertex", vertex), _face_element(mesh.faces)]
     write_whole(Path(path), _file([], elements))
+
+
+def points_ply_bytes(
+    points: FloatArray, labels: IntArray, names: Sequence[str], colors: ByteArray | None
+) -> bytes:
+    """A PLY of points that know their scan: property ``scan`` of each vertex.
+
+    Args:
+        points: (N, 3).
+        labels: (N,) which of the names each is of; comments ``scan K = NAME`` tell them.
+        names: Of the scans, on one line each.
+        colors: (N, 3) or None.
+    """
+    vertex = _vertex_fields(points, None, colors)
+    vertex["scan"] = labels.astype("<i4")
+    comments = [f"comment scan {k} = {name}" for k, name in enumerate(names)]
+    return _file([], [_scalar_element("vertex", vertex)], comments)
 
 
 def _camera_text(camera: Camera) -> str:
@@ -110,9 +136,12 @@ def _index_element(name: str, lists: IntArray, counts: ByteArray) -> tuple[list[
     return header, octets[kept].tobytes()
 
 
-def _file(info: list[str], elements: list[tuple[list[str], bytes]]) -> bytes:
-    lines = ["ply", "format binary_little_endian 1.0", *(f"obj_info {line}" for line in info)]
+def _file(
+    info: list[str], elements: list[tuple[list[str], bytes]], comments: Sequence[str] = ()
+) -> bytes:
+    lines = ["ply", "format binary_little_endian 1.0", *comments]
+    lines += [f"obj_info {line}" for line in info]
     for header, _ in elements:
         lines += header
     text = "\n".join([*lines, "end_header", ""])
-    return text.encode("ascii") + b"".join(body for _, body in elements)
+    return text.encode("utf-8") + b"".join(body for _, body in elements)

@@ -47,7 +47,7 @@ def read_poses(path: Path | str) -> PoseSet:
         ReadError: If the file is not such JSON, or a matrix is not a rigid motion.
     """
     path = Path(path)
-    content = _load(path)
+    content = load_json(path, read_text(path))
     try:
         if "format" not in content:
             poses = {name: _pose(name, rows) for name, rows in content.items()}
@@ -98,12 +98,24 @@ def _block(brackets: str, items: list[str]) -> str:
     return f"{brackets[0]}\n  " + ",\n  ".join(items) + f"\n {brackets[1]}"
 
 
-def _load(path: Path) -> dict[str, Any]:
-    """The JSON object in a file; NaN and keys that come twice are errors."""
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file.
+
+    Raises:
+        ReadError: If it cannot be read, or is no such text.
+    """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ReadError(f"{path}: cannot be read ({error}); check the path") from error
+
+
+def load_json(path: Path, text: str) -> dict[str, Any]:
+    """The JSON object in a file's text; NaN and keys that come twice are errors.
+
+    Raises:
+        ReadError: If it is none.
+    """
     try:
         content = json.loads(
             text, object_pairs_hook=_without_repeats, parse_constant=_refuse_constant
@@ -111,7 +123,7 @@ def _load(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise ReadError(f"{path}: not valid JSON ({error}); correct or replace it") from error
     if not isinstance(content, dict):
-        raise ReadError(f"{path}: not a JSON object of poses by name; give a file of poses")
+        raise ReadError(f"{path}: not a JSON object; give another file")
     return content
 
 

@@ -22,6 +22,7 @@ class RawScan:
     """A file's content as it stands there: points may be NaN, and indices out of range.
 
     Attributes as in ``RangeScan``; intensity (N,) uint8 is grey, used where there are no colours.
+    Support, stdev and filled (N,) are of a mesh, see ``TriangleMesh``.
     Readers hand their arrays over: nobody writes to them any more, so that scans may share them.
     """
 
@@ -32,6 +33,9 @@ class RawScan:
     colors: ByteArray | None = None
     intensity: ByteArray | None = None
     confidence: FloatArray | None = None
+    support: FloatArray | None = None
+    stdev: FloatArray | None = None
+    filled: FloatArray | None = None
     camera: Camera | None = None
     scan_from_sensor: Pose | None = None
     notes: tuple[str, ...] = ()
@@ -97,11 +101,15 @@ def to_mesh(path: Path, raw: RawScan) -> TriangleMesh:
     faces = np.zeros((0, 3), np.int64) if raw.faces is None else _whole(new_index[raw.faces])
     if not len(faces):
         raise ReadError(f"{path}: has no faces, so it is no mesh; give a file with triangles")
+    support = None if raw.support is None else np.nan_to_num(raw.support[finite])
     return TriangleMesh(
         vertices=raw.points[finite],
         faces=faces,
         normals=None if raw.normals is None else _zero_unless_finite(raw.normals[finite]),
         colors=None if raw.colors is None else raw.colors[finite],
+        support=None if support is None else support.astype(np.int64),
+        stdev=None if raw.stdev is None else raw.stdev[finite],
+        filled=None if raw.filled is None else raw.filled[finite] > 0,
     )
 
 

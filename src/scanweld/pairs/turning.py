@@ -109,7 +109,7 @@ def _marks(seen: Sequence[TwoWay], tolerance: float) -> tuple[BoolArray, BoolArr
 
 
 def _around(patches: BoolArray) -> BoolArray:
-    return np.asarray(ndimage.binary_dilation(patches))
+    return np.asarray(ndimage.binary_dilation(patches), dtype=bool)
 
 
 def _shared(both: TwoWay, marks: tuple[BoolArray, BoolArray], tolerance: float) -> int:

@@ -35,19 +35,25 @@ MAX_FILL_OFFSET = 0.3
 """whose neighbours must lie all around it: their mean is no farther off, in radii."""
 
 
-def clean_depth(depth: FloatArray, pixel: float, max_step: float) -> FloatArray:
+def clean_depth(
+    depth: FloatArray,
+    pixel: float,
+    max_step: float,
+    max_noise_pixels: float = CLEAN_NOISE_PIXELS,
+) -> FloatArray:
     """A depth image without noise, outliers and small gaps, where it has more than a good scan.
 
     Args:
         depth: (H, W), NaN where there is no surface.
         pixel: Footprint of a pixel, in the scans' unit.
         max_step: Depth step between neighbours above which they are two surfaces.
+        max_noise_pixels: Noise, in footprints, up to which a scan is a good one.
 
     Returns:
         (H, W) depth; as given where the scan is good.
     """
     sigma = noise_of(depth)
-    if sigma < CLEAN_NOISE_PIXELS * pixel and not has_gaps(depth):
+    if sigma < max_noise_pixels * pixel and not has_gaps(depth):
         return depth
     radius = smoothing_radius(sigma / pixel)
     reach = max(NOISE_REACH * sigma, MIN_REACH_PIXELS * pixel)

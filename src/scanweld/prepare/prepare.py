@@ -6,6 +6,7 @@ import numpy as np
 
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.prepared import PreparedScan, RangeImage, Samples
 from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.prepare.range_image import make_range_image
@@ -33,15 +34,11 @@ def prepare(
         InputError: If the scan shows too little surface to be registered.
     """
     located = locate_sensor(scan)
-    sensor_from_scan = located.sensor_pose.inverse()
     resolution = point_spacing(located.points)
-    clean = without_strays(located, sensor_from_scan.apply(located.points), resolution)
-    points = sensor_from_scan.apply(clean.points)
-    support = find_support(points, resolution) if without_support else None
-    if support is not None:
-        note = f"the flat support under the object is left out: {support.sum()} points"
+    clean, points, num_support = _cleaned(located, resolution, without_support)
+    if num_support:
+        note = f"the flat support under the object is left out: {num_support} points"
         located = replace(located, notes=(*located.notes, note))
-        clean, points = clean.only(~support), points[~support]
     diameter = principal_diameter(points)
     image, mesh = make_range_image(clean, points, resolution, diameter, config)
     samples = take_samples(image, config)
@@ -58,8 +55,31 @@ def prepare(
         resolution=resolution,
         diameter=diameter,
         content_hash=scan.content_hash(),
-        is_without_support=support is not None,
+        is_without_support=num_support > 0,
     )
+
+
+def surface_points(scan: PreparedScan) -> tuple[RangeScan, FloatArray]:
+    """What a scan's image was made of: the scan without what was left out, and its points.
+
+    Returns:
+        The scan, and its points (N, 3) in the sensor frame.
+    """
+    clean, points, _ = _cleaned(scan.scan, scan.resolution, scan.is_without_support)
+    return clean, points
+
+
+def _cleaned(
+    located: RangeScan, resolution: float, without_support: bool
+) -> tuple[RangeScan, FloatArray, int]:
+    """The scan without strays and support, its points in the sensor frame, size of the support."""
+    sensor_from_scan = located.sensor_pose.inverse()
+    clean = without_strays(located, sensor_from_scan.apply(located.points), resolution)
+    points = sensor_from_scan.apply(clean.points)
+    support = find_support(points, resolution) if without_support else None
+    if support is None:
+        return clean, points, 0
+    return clean.only(~support), points[~support], int(support.sum())
 
 
 def stands_on_support(scan: PreparedScan) -> bool:

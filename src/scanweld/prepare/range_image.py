@@ -7,17 +7,11 @@ from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.grid import grid_faces
-from scanweld.geometry.mesh import (
-    TriangleMesh,
-    border_vertices,
-    face_normals,
-    pieces,
-    vertex_normals,
-)
+from scanweld.geometry.mesh import TriangleMesh, border_vertices, pieces, smoothed_normals
 from scanweld.geometry.prepared import RangeImage
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import RangeScan
-from scanweld.prepare.denoise import clean_depth, has_gaps
+from scanweld.prepare.denoise import CLEAN_NOISE_PIXELS, clean_depth, has_gaps
 from scanweld.prepare.silhouette import classify_pixels
 
 MARGIN_DIAMETERS = 0.05
@@ -53,10 +47,56 @@ def make_range_image(
         The range image, and the surface between its pixels cut at depth jumps: vertices are the
         surface pixels in row-major order, faces and smoothed normals look to the sensor.
     """
+    spacing = max(natural_pixel(scan, resolution), diameter / config.image_pixels)
     organised = scan.grid is not None or scan.faces is not None
-    spacing = max(resolution * (1.0 if organised else POINT_PIXELS), diameter / config.image_pixels)
     pixel = _pixel_size(spacing, diameter, config) if organised else spacing
     margin = (config.closing_diameters + MARGIN_DIAMETERS) * diameter
+    camera, depth, mesh = render_surface(scan, points, spacing, pixel, margin, config)
+    kind, outside = classify_pixels(
+        np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
+    )
+    image = RangeImage(
+        camera=camera,
+        depth=depth,
+        normals=normals_image(depth, mesh),
+        kind=kind,
+        outside=outside * pixel,
+        is_rim=rim_pixels(depth, mesh, config.rim_pixels),
+        pixel=pixel,
+    )
+    return image, mesh
+
+
+def natural_pixel(scan: RangeScan, resolution: float) -> float:
+    """The finest footprint of a pixel that a scan's points, with this spacing, can fill."""
+    is_organised = scan.grid is not None or scan.faces is not None
+    return resolution * (1.0 if is_organised else POINT_PIXELS)
+
+
+def render_surface(
+    scan: RangeScan,
+    points: FloatArray,
+    spacing: float,
+    pixel: float,
+    margin: float,
+    config: PrepareConfig,
+    max_noise_pixels: float = CLEAN_NOISE_PIXELS,
+) -> tuple[Camera, FloatArray, TriangleMesh]:
+    """A scan's surface along its own viewing rays, at any footprint of a pixel.
+
+    Args:
+        scan: A scan whose sensor is located.
+        points: (N, 3), the scan's points in the sensor frame.
+        spacing: Of the points, or coarser; points farther apart than some of it are not joined.
+        pixel: Footprint of a pixel on the object.
+        margin: Space around the points that the image holds, likewise a length.
+        config: Settings.
+        max_noise_pixels: Noise of depth, in pixels, above which it is smoothed.
+
+    Returns:
+        The camera, the depth (H, W), NaN where there is no surface, and the mesh between the
+        pixels cut at depth jumps: vertices are the surface pixels in row-major order.
+    """
     camera = working_camera(scan, points, pixel, margin)
     faces = _scan_faces(scan, points, spacing, config)
     if faces is not None:
@@ -72,21 +112,9 @@ def make_range_image(
         depth = _splat(points, camera)
     for _ in range(PINHOLE_ROUNDS):
         depth = _fill_pinholes(depth, config.jump_pixels * pixel)
-    depth = clean_depth(depth, pixel, config.jump_pixels * pixel)
+    depth = clean_depth(depth, pixel, config.jump_pixels * pixel, max_noise_pixels)
     depth, mesh = _surface(depth, camera, pixel, config)
-    kind, outside = classify_pixels(
-        np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
-    )
-    image = RangeImage(
-        camera=camera,
-        depth=depth,
-        normals=_to_image(depth, np.asarray(mesh.normals)),
-        kind=kind,
-        outside=outside * pixel,
-        is_rim=_rim(depth, mesh, config.rim_pixels),
-        pixel=pixel,
-    )
-    return image, mesh
+    return camera, depth, mesh
 
 
 def _pixel_size(spacing: float, diameter: float, config: PrepareConfig) -> float:
@@ -191,22 +219,7 @@ def _depth_mesh(
 
 def _smoothed_normals(points: FloatArray, faces: IntArray, camera: Camera) -> FloatArray:
     """Area-weighted normals (V, 3), averaged over the neighbours along the mesh, to the sensor."""
-    normals = vertex_normals(points, faces)
-    area = np.linalg.norm(face_normals(points, faces), axis=1, keepdims=True)
-    for _ in range(NORMAL_SMOOTHING_ROUNDS):
-        mean = area * normals[faces].sum(axis=1)
-        summed = np.stack(
-            [
-                sum(
-                    np.bincount(faces[:, k], weights=mean[:, axis], minlength=len(points))
-                    for k in range(3)
-                )
-                for axis in range(3)
-            ],
-            axis=1,
-        )
-        length = np.linalg.norm(summed, axis=1, keepdims=True)
-        normals = np.where(length > 0, summed / np.where(length > 0, length, 1.0), normals)
+    normals = smoothed_normals(points, faces, NORMAL_SMOOTHING_ROUNDS)
     lonely = ~(np.abs(normals).sum(axis=1) > 0)
     normals[lonely] = -camera.view_directions(points[lonely])
     return normals
@@ -218,7 +231,8 @@ def _piece_sizes(mesh: TriangleMesh) -> IntArray:
     return np.bincount(piece)[piece]
 
 
-def _rim(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
+def rim_pixels(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
+    """Pixels (H, W) of a surface's border, and the next ones up to a width of so many."""
     has = np.isfinite(depth)
     border = np.zeros(depth.shape, dtype=bool)
     has_face = np.zeros(len(mesh.vertices), dtype=bool)
@@ -229,9 +243,10 @@ def _rim(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
     return border & has
 
 
-def _to_image(depth: FloatArray, values: FloatArray) -> FloatArray:
-    image = np.full((*depth.shape, values.shape[1]), np.nan)
-    image[np.isfinite(depth)] = values
+def normals_image(depth: FloatArray, mesh: TriangleMesh) -> FloatArray:
+    """The normals of a depth image's mesh as an image (H, W, 3), NaN off the surface."""
+    image = np.full((*depth.shape, 3), np.nan)
+    image[np.isfinite(depth)] = mesh.normals
     return image
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scanweld.geometry.arrays import ByteArray, FloatArray
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose, nearest_rotation
@@ -44,6 +44,30 @@ def render_shaded(
     Returns:
         (H, W, 3) picture on white.
     """
+    picture, _ = _render(mesh, direction, up, size, smooth)
+    return np.rint(_shrunk(picture)).astype(np.uint8)
+
+
+def render_cutout(
+    mesh: TriangleMesh,
+    direction: ArrayLike,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+    size: int = 600,
+    *,
+    smooth: bool = True,
+) -> ByteArray:
+    """Like ``render_shaded``, but (H, W, 4) with the background transparent."""
+    picture, seen = _render(mesh, direction, up, size, smooth)
+    picture[~seen] = 0.0
+    cover = _shrunk(seen[..., None].astype(np.float64))
+    color = np.divide(_shrunk(picture), cover, out=np.zeros((*cover.shape[:2], 3)), where=cover > 0)
+    return np.rint(np.concatenate([color, 255.0 * cover], axis=2)).astype(np.uint8)
+
+
+def _render(
+    mesh: TriangleMesh, direction: ArrayLike, up: ArrayLike, size: int, smooth: bool
+) -> tuple[FloatArray, BoolArray]:
+    """The picture (H, W, 3) at twice the size, and which of its pixels (H, W) show the mesh."""
     picture_from_world = looking_from(np.asarray(direction, float), np.asarray(up, float))
     points = picture_from_world.apply(mesh.vertices)
     camera = _camera_around(points[np.unique(mesh.faces)], size * _OVERSAMPLING)
@@ -63,7 +87,7 @@ def render_shaded(
         color = np.einsum("nk,nkc->nc", shares, mesh.colors[faces].astype(float))
     color = np.where((facing > 0)[:, None], _BACK, color)
     picture[seen] = color * (_AMBIENT + (1 - _AMBIENT) * np.minimum(light, 1.0))[:, None]
-    return _shrunk(picture)
+    return picture, seen
 
 
 def side_by_side(pictures: Sequence[ByteArray]) -> ByteArray:
@@ -77,12 +101,17 @@ def side_by_side(pictures: Sequence[ByteArray]) -> ByteArray:
 
 def write_png(path: Path | str, picture: ByteArray) -> None:
     """Write a picture (H, W, 3) as a PNG file."""
-    height, width, _ = picture.shape
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    rows = np.zeros((height, 1 + 3 * width), np.uint8)
+    Path(path).write_bytes(png_bytes(picture))
+
+
+def png_bytes(picture: ByteArray) -> bytes:
+    """A picture (H, W, 3), or (H, W, 4) with transparency, as a PNG file's bytes."""
+    height, width, channels = picture.shape
+    header = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    rows = np.zeros((height, 1 + channels * width), np.uint8)
     rows[:, 1:] = picture.reshape(height, -1)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
-    Path(path).write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks)
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:
@@ -129,5 +158,5 @@ def barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
 def _shrunk(picture: FloatArray) -> ByteArray:
     k = _OVERSAMPLING
     height, width = picture.shape[0] // k, picture.shape[1] // k
-    cells = picture[: k * height, : k * width].reshape(height, k, width, k, 3)
-    return np.rint(cells.mean(axis=(1, 3))).astype(np.uint8)
+    cells = picture[: k * height, : k * width].reshape(height, k, width, k, -1)
+    return cells.mean(axis=(1, 3))

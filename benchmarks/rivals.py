@@ -1,0 +1,131 @@
+"""Open3D's ways from posed range images to a mesh, given the same scans, poses and voxels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from scanweld.config import PrepareConfig
+from scanweld.errors import InputError
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.rasterize import render_depth
+from scanweld.prepare.prepare import surface_points
+from scanweld.prepare.range_image import render_surface
+
+TRUNCATION_VOXELS = 4.0
+MAX_BLOCKS = 100_000
+FAR_DIAMETERS = 20.0
+"""An orthographic sensor is a pinhole so far away."""
+POISSON_REACH_VOXELS = 2.0
+"""Poisson's surface closes everything; what lies farther from all points is cut off."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Shape:
+    """A scan's surface at full resolution: points and normals (N, 3), faces, sensor frame."""
+
+    camera: Camera
+    depth: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    faces: IntArray
+    world_from_sensor: Pose
+
+    @property
+    def world_points(self) -> FloatArray:
+        """(N, 3)."""
+        return self.world_from_sensor.apply(self.points)
+
+
+def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
+    """A scan's surface, one pixel a point."""
+    kept, points = surface_points(scan)
+    pixel = scan.resolution
+    camera, depth, mesh = render_surface(kept, points, pixel, pixel, 2.0 * pixel, PrepareConfig())
+    return Shape(
+        camera=camera,
+        depth=depth,
+        points=np.asarray(mesh.vertices),
+        normals=np.asarray(mesh.normals),
+        faces=np.asarray(mesh.faces),
+        world_from_sensor=world_from_sensor,
+    )
+
+
+def open3d() -> ModuleType:
+    """The library.
+
+    Raises:
+        InputError: If it is not installed.
+    """
+    try:
+        import open3d as library
+    except ImportError as error:
+        raise InputError(f"open3d: {error}: run pip install 'scanweld[bench]'") from error
+    return library
+
+
+def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
+    """Open3D's truncated signed distances, in its grid of voxel blocks; one scan is enough."""
+    core, geometry = open3d().core, open3d().t.geometry
+    grid = geometry.VoxelBlockGrid(
+        attr_names=("tsdf", "weight"),
+        attr_dtypes=(core.float32, core.float32),
+        attr_channels=((1), (1)),
+        voxel_size=voxel,
+        block_resolution=8,
+        block_count=MAX_BLOCKS,
+    )
+    for shape in shapes:
+        seen = _as_pinhole(shape)
+        c = seen.camera
+        depth = np.where(np.isfinite(seen.depth), seen.depth, 0.0).astype(np.float32)
+        image, far = geometry.Image(depth), 2.0 * float(depth.max())
+        lens = core.Tensor(np.array([[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1.0]]))
+        pose = core.Tensor(seen.world_from_sensor.inverse().matrix())
+        blocks = grid.compute_unique_block_coordinates(
+            image, lens, pose, 1.0, far, TRUNCATION_VOXELS
+        )
+        grid.integrate(blocks, image, lens, pose, 1.0, far, TRUNCATION_VOXELS)
+    return _converted(grid.extract_triangle_mesh(weight_threshold=0.0).to_legacy())
+
+
+def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
+    """Open3D's screened Poisson reconstruction, cut off where there are no points."""
+    o3d = open3d()
+    points = np.concatenate([shape.world_points for shape in shapes])
+    normals = np.concatenate([shape.world_from_sensor.turn(shape.normals) for shape in shapes])
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
+        cloud, depth=0, width=voxel, n_threads=1
+    )
+    apart = o3d.geometry.PointCloud(mesh.vertices).compute_point_cloud_distance(cloud)
+    mesh.remove_vertices_by_mask(np.asarray(apart) > POISSON_REACH_VOXELS * voxel)
+    return _converted(mesh)
+
+
+def _as_pinhole(shape: Shape) -> Shape:
+    """The same surface as a pinhole sees it; from far away, if the sensor is none."""
+    if shape.camera.model is CameraModel.PINHOLE:
+        return shape
+    size = float(np.linalg.norm(np.ptp(shape.points, axis=0)))
+    back = np.array([0.0, 0.0, FAR_DIAMETERS * size - float(np.median(shape.points[:, 2]))])
+    points = shape.points + back
+    c, far = shape.camera, FAR_DIAMETERS * size
+    camera = replace(c, model=CameraModel.PINHOLE, fx=far * c.fx, fy=far * c.fy)
+    depth, _ = render_depth(points, shape.faces, camera)
+    moved = shape.world_from_sensor @ Pose(rotation=np.eye(3), translation=-back)
+    return replace(shape, camera=camera, depth=depth, points=points, world_from_sensor=moved)
+
+
+def _converted(mesh: Any) -> TriangleMesh:
+    mesh.remove_duplicated_vertices()
+    mesh.remove_unreferenced_vertices()
+    return TriangleMesh(vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.triangles))

@@ -1,0 +1,129 @@
+"""Scans whose poses are known already, to a model: ``scanweld fuse``."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from scanweld.app.html_report import write_html_report
+from scanweld.app.job import read_all, relative_paths
+from scanweld.app.outputs import write_outputs
+from scanweld.app.workspace import Workspace
+from scanweld.config import Config
+from scanweld.fusion import fuse
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.intake import Intake, take_in
+from scanweld.io import collect, natural_key
+from scanweld.io.pose_formats import Frame, PoseEntries, match_poses, read_any_poses
+from scanweld.io.pose_formats.records import require_pinhole
+from scanweld.knowledge import Knowledge
+from scanweld.outcome import prepared_report, unplaced_report
+from scanweld.parallel import num_workers, single_threaded_algebra
+from scanweld.progress import NoCache, Progress, ScanRefused, silent, telling
+from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+from scanweld.stages import Stages
+
+
+def fuse_job(
+    inputs: Sequence[Path | str],
+    poses: Path,
+    output: Path,
+    config: Config | None = None,
+    *,
+    workers: int | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Reconstruction:
+    """Read scans and poses, fuse them, and write a model's folder, whose graph has no pairs.
+
+    Args:
+        inputs: Files, folders and glob patterns.
+        poses: A file of poses in any format that scanweld knows, or a folder of them.
+        output: The folder to be made; it appears when it is whole.
+        config: Settings; the defaults if not given.
+        workers: Threads; as many as there are cores if not given.
+        force: Whether an output that is there already is replaced.
+        progress: Told of stages, their finished items, and scans that are refused.
+
+    Returns:
+        The model and the poses in the world frame that was given; these are not judged.
+
+    Raises:
+        ScanweldError: If the poses cannot be read or are of other scans, there are fewer than two
+            usable scans, or the output cannot be written.
+    """
+    config = config or Config()
+    files = collect(inputs)
+    found = read_any_poses(poses)
+    known = match_poses(poses, found, [file.name for file in files])
+    parts = [*(poses.iterdir() if poses.is_dir() else [poses]), *(file.path for file in files)]
+    with Workspace(output, inputs=parts, force=force) as workspace:
+        scans, unreadable = read_all([file for file in files if file.name in known], progress)
+        stages = Stages(workers=num_workers(workers), cache=NoCache(), progress=progress)
+        without = {
+            file.name: f"no pose in {poses.name}" for file in files if file.name not in known
+        }
+        for name, reason in without.items():
+            progress(ScanRefused(scan=name, reason=reason))
+        with single_threaded_algebra():
+            intake = take_in(scans, unreadable, Knowledge(), config, stages)
+            result = _fuse(intake, known, found, without, config, stages)
+        write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
+        with telling(progress, "report"):
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
+        workspace.publish()
+    return result
+
+
+def _fuse(
+    intake: Intake,
+    known: Mapping[str, Pose],
+    found: PoseEntries,
+    without: Mapping[str, str],
+    config: Config,
+    stages: Stages,
+) -> Reconstruction:
+    """Fuse the scans that can be, and report the others, some of which are without a pose."""
+    world_from_sensor = [_sensor_pose(scan, known[scan.name], found) for scan in intake.prepared]
+    with stages.stage("fuse") as counts:
+        mesh = fuse(
+            intake.prepared,
+            world_from_sensor,
+            config.fusion,
+            prepare=config.prepare,
+            workers=stages.workers,
+        )
+        counts["faces"] = len(mesh.faces)
+    pairs = zip(intake.prepared, world_from_sensor, strict=True)
+    poses = {scan.name: pose @ scan.scan_from_sensor.inverse() for scan, pose in pairs}
+    if found.frame is Frame.SCAN:
+        poses = {name: known[name] for name in poses}  # as given, to the last bit
+    left_out = {**intake.refused, **without}
+    told = "fused with the pose that was given, which is not judged"
+    return Reconstruction(
+        poses=poses,
+        components=(tuple(sorted(poses, key=natural_key)),),
+        unplaced=left_out,
+        scans={
+            **{s.name: prepared_report(s, ScanVerdict.GIVEN, told) for s in intake.prepared},
+            **{n: unplaced_report(intake.scans.get(n), why) for n, why in left_out.items()},
+        },
+        pairs=(),
+        mesh=mesh,
+        verdict=Verdict.PARTIAL if left_out else Verdict.GIVEN,
+        reasons=_reasons(left_out),
+        stages=stages.reports,
+        config=config,
+    )
+
+
+def _reasons(left_out: Mapping[str, str]) -> tuple[str, ...]:
+    names = ", ".join(sorted(left_out, key=natural_key))
+    return (f"left out: {names}",) if left_out else ()
+
+
+def _sensor_pose(scan: PreparedScan, pose: Pose, found: PoseEntries) -> Pose:
+    """world_from_sensor, from a pose in the frame that the file speaks of."""
+    if found.frame is Frame.SCAN:
+        return pose @ scan.scan_from_sensor
+    require_pinhole(scan.name, scan.scan.camera, found.title)
+    return pose

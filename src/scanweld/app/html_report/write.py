@@ -1,0 +1,70 @@
+"""report.html into a model folder."""
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from scanweld.app.html_report.page import report_page
+from scanweld.app.html_report.sources import Sources
+from scanweld.app.model_folder import ModelFolder, open_model
+from scanweld.config import Config
+from scanweld.errors import ReadError
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import write_whole
+
+logger = logging.getLogger(__name__)
+
+
+def write_html_report(folder: Path, scans: Mapping[str, RangeScan] | None = None) -> Path:
+    """Write report.html beside the files that a run wrote: the same files give the same bytes.
+
+    Args:
+        folder: The model folder.
+        scans: The scans by name. Without them the page has no residuals, support and contours.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        ReadError: If a part of the folder is missing or broken.
+        InputError: If a placed scan is missing, or is not what the model was made of.
+        WriteError: If the page cannot be written.
+    """
+    model = open_model(folder)
+    _check_whole(model)
+    config = _settings(model)
+    sources = None
+    if scans is not None and model.poses.poses:
+        sources = Sources(model, scans, config.prepare)
+    page = report_page(model, sources, config)
+    path = folder / "report.html"
+    write_whole(path, page.encode("utf-8"))
+    logger.debug("%s: %d bytes", path, len(page))
+    return path
+
+
+def _check_whole(model: ModelFolder) -> None:
+    """Refuse a folder that lacks a part, or whose parts are of different runs."""
+    path = model.path
+    in_pairs = [name for pair in model.graph.pairs for name in (pair.i, pair.j)]
+    if strangers := sorted({*model.poses.poses, *in_pairs} - set(model.report.scans)):
+        raise ReadError(
+            f"{path}: report.json does not know the scan {strangers[0]!r} of the other files; "
+            "give the folder of one run"
+        )
+    fused = model.report.stages.get("fuse")
+    if model.mesh is None and fused is not None and fused.counts.get("faces"):
+        raise ReadError(f"{model.mesh_path}: is missing; copy the model folder as a whole")
+
+
+def _settings(model: ModelFolder) -> Config:
+    try:
+        return Config.model_validate(model.report.settings)
+    except ValidationError as error:
+        where = ".".join(str(part) for part in error.errors()[0]["loc"])
+        raise ReadError(
+            f"{model.path / 'report.json'}: settings.{where} is of another version; run scanweld "
+            "again"
+        ) from error

@@ -1,0 +1,123 @@
+"""report.json and graph.json as they are read back."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from scanweld.errors import ReadError
+from scanweld.io.poses import load_json, read_text
+from scanweld.pairs.result import Evidence, PairKind
+from scanweld.reconstruction import FactReport, ScanVerdict, Verdict
+
+
+class Entry(BaseModel):
+    """Part of a file; keys that are not named here are left alone."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class FileEntry(Entry):
+    """Where a scan's file is, as seen from the folder."""
+
+    file: str | None = None
+
+
+class Files(Entry):
+    """What report.json says of where the scans are, and how they were read."""
+
+    scans: dict[str, FileEntry]
+    max_points: int | None = None
+
+
+class ScanEntry(Entry):
+    """A scan in report.json."""
+
+    verdict: ScanVerdict
+    reason: str
+    num_points: int
+    num_dropped: int
+    resolution: float | None
+    diameter: float | None
+    camera: str | None
+    viewpoint: str
+    notes: tuple[str, ...]
+    content_hash: str | None
+    num_keypoints: int
+    edges: tuple[str, ...]
+    overlap: float | None
+    rms: float | None
+    is_without_support: bool = False
+    confidence: float | None = None
+
+
+class StageEntry(Entry):
+    """A stage in report.json; what it counted is kept as extra keys."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    seconds: float
+    peak_mb: float
+
+    @property
+    def counts(self) -> Mapping[str, Any]:
+        """What the stage counted, by name."""
+        return self.model_extra or {}
+
+
+class Report(Entry):
+    """report.json."""
+
+    format: Literal[1]
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    knowledge: tuple[FactReport, ...] = ()
+    scans: dict[str, ScanEntry]
+    stages: dict[str, StageEntry]
+    settings: dict[str, Any]
+
+
+class PairEntry(Entry):
+    """A pair in graph.json."""
+
+    i: str
+    j: str
+    kind: PairKind
+    accepted: bool
+    reason: str
+    score: float | None
+    overlap: float
+    evidence: Evidence | None
+    margin: float | None
+    observability: float | None
+    sliding: str | None = None
+    confidence: float | None = None
+
+
+class Graph(Entry):
+    """graph.json."""
+
+    format: Literal[1]
+    pairs: tuple[PairEntry, ...]
+
+
+Content = TypeVar("Content", bound=Entry)
+
+
+def read_entries(path: Path, kind: type[Content]) -> Content:
+    """Read one of the files.
+
+    Raises:
+        ReadError: If it is missing, broken, or does not say what it should.
+    """
+    if not path.is_file():
+        raise ReadError(f"{path}: is missing; name a folder that scanweld run or fuse has made")
+    content = load_json(path, read_text(path))
+    try:
+        return kind.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the whole"
+        raise ReadError(
+            f"{path}: {where}: {first['msg'].lower()}; run scanweld again to write it anew"
+        ) from error

@@ -1,0 +1,140 @@
+"""A model's folder, as ``scanweld run`` and ``scanweld fuse`` write it, opened again."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from scanweld.app.model_files import Files, Graph, Report, read_entries
+from scanweld.config import Unit, load_config
+from scanweld.errors import InputError, ReadError
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
+from scanweld.io.pose_formats.records import printed
+from scanweld.prepare.thinning import thinned
+from scanweld.reconstruction import ScanVerdict
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelFolder:
+    """A model's folder; but for the poses, what it holds is read when it is asked for, and once.
+
+    Attributes:
+        path: Of the folder.
+        poses: Poses of the scans, and its components.
+    """
+
+    path: Path
+    poses: PoseSet
+
+    @property
+    def mesh_path(self) -> Path:
+        """Where the mesh is."""
+        return self.path / "model.ply"
+
+    @cached_property
+    def mesh(self) -> TriangleMesh | None:
+        """The mesh of the largest component; None where there is none.
+
+        Raises:
+            ReadError: If it is broken, or has no faces.
+        """
+        return read_mesh(self.mesh_path) if self.mesh_path.is_file() else None
+
+    @cached_property
+    def report(self) -> Report:
+        """What was made of the scans.
+
+        Raises:
+            ReadError: If it is missing or broken.
+        """
+        return read_entries(self.path / "report.json", Report)
+
+    @cached_property
+    def graph(self) -> Graph:
+        """All pairs; none where the poses were given.
+
+        Raises:
+            ReadError: If it is missing or broken.
+        """
+        return read_entries(self.path / "graph.json", Graph)
+
+    @property
+    def fused_scans(self) -> list[str]:
+        """Scans that the mesh of a run was made of: doubtful ones if they were asked for."""
+        with_doubtful = self.report.settings.get("fusion", {}).get("with_doubtful", False)
+        return [
+            name
+            for name in (self.poses.components or ((),))[0]
+            if with_doubtful or self.report.scans[name].verdict is not ScanVerdict.DOUBTFUL
+        ]
+
+    @cached_property
+    def unit(self) -> Unit | None:
+        """Of the scans; None where unknown.
+
+        Raises:
+            ConfigError: If the settings are broken.
+        """
+        settings = self.path / "config.toml"
+        return load_config(settings).unit if settings.is_file() else None
+
+    def scan_files(self, names: Iterable[str], given: Sequence[Path | str] = ()) -> dict[str, Path]:
+        """Where the files of some scans are: among those given, else where the report says.
+
+        Args:
+            names: Of the scans.
+            given: Files, folders and glob patterns, where the scans have been moved.
+
+        Raises:
+            InputError: If one of them is not there.
+            ReadError: If the report is broken.
+        """
+        found = {file.name: file.path for file in collect(given)} if given else self._told_files()
+        names = list(names)
+        for name in names:
+            if name not in found or not found[name].is_file():
+                place = f" ({found[name]})" if name in found else ""
+                where = "among the scans given" if given else f"where the model says{place}"
+                raise InputError(
+                    f"{printed(name)}: its file is not {where}; name all scans with --scans"
+                )
+        return {name: found[name] for name in names}
+
+    def read_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+        """Scans as the model's maker took them: thinned where it had to save memory.
+
+        Args:
+            files: As ``scan_files`` finds them, by the scans' names.
+
+        Raises:
+            ReadError: If one of them, or the report, is broken.
+        """
+        most = self._files.max_points
+        return {
+            name: read_scan(path, name) if most is None else thinned(read_scan(path, name), most)
+            for name, path in files.items()
+        }
+
+    @cached_property
+    def _files(self) -> Files:
+        report = self.path / "report.json"
+        return read_entries(report, Files) if report.is_file() else Files(scans={})
+
+    def _told_files(self) -> Mapping[str, Path]:
+        scans = self._files.scans
+        return {name: self.path / scan.file for name, scan in scans.items() if scan.file}
+
+
+def open_model(path: Path) -> ModelFolder:
+    """Open a model's folder.
+
+    Raises:
+        ReadError: If it is no such folder, or its poses are broken.
+    """
+    if not (path / "poses.json").is_file():
+        raise ReadError(
+            f"{path}: holds no poses.json; name a folder that scanweld run or fuse has made"
+        )
+    return ModelFolder(path=path, poses=read_poses(path / "poses.json"))

@@ -1,0 +1,79 @@
+"""nerfstudio's ``transforms.json``: cameras in OpenGL axes (x right, y *up*, z *back*).
+
+As in nerfstudio's data conventions: ``transform_matrix`` takes the camera to the world, intrinsics
+may stand in each frame. Its rays go through pixel + 0.5 (``Cameras.get_image_coords``), half a
+pixel from scanweld's. No images are written: the paths are those that pictures would have.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scanweld.errors import ReadError
+from scanweld.geometry.pose import Pose
+from scanweld.io.pose_formats.colmap import IMAGE_SUFFIX, PIXEL_CENTRE
+from scanweld.io.pose_formats.records import Frame, PosedScan, PoseEntries, parse_pose
+from scanweld.io.poses import load_json
+
+TITLE = "nerfstudio"
+_SENSOR_FROM_OPENGL = Pose(rotation=np.diag([1.0, -1.0, -1.0]), translation=np.zeros(3))
+_FOLDER = "images/"
+
+
+def recognise_json(content: dict[str, Any]) -> bool:
+    """Whether the JSON looks like this format."""
+    return isinstance(content.get("frames"), list)
+
+
+def read(path: Path, text: str) -> PoseEntries:
+    """The poses of all frames.
+
+    Raises:
+        ReadError: If a frame has no name, or its matrix is not a rigid motion.
+    """
+    frames = load_json(path, text).get("frames")
+    if not isinstance(frames, list):
+        raise ReadError(f"{path}: has no list of frames; write it anew")
+    entries = tuple(_entry(path, k, frame) for k, frame in enumerate(frames))
+    return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=entries)
+
+
+def write(scans: Sequence[PosedScan]) -> dict[str, str]:
+    """The file's text by its name.
+
+    Raises:
+        InputError: If a sensor is no pinhole.
+    """
+    frames = [_frame(scan) for scan in scans]
+    content = {"camera_model": "OPENCV", "frames": frames}
+    return {"transforms.json": json.dumps(content, indent=1) + "\n"}
+
+
+def _frame(scan: PosedScan) -> dict[str, Any]:
+    camera = scan.pinhole(TITLE)
+    world_from_opengl = scan.world_from_sensor() @ _SENSOR_FROM_OPENGL
+    return {
+        "file_path": f"{_FOLDER}{scan.name}{IMAGE_SUFFIX}",
+        "fl_x": camera.fx,
+        "fl_y": camera.fy,
+        "cx": camera.cx + PIXEL_CENTRE,
+        "cy": camera.cy + PIXEL_CENTRE,
+        "w": camera.width,
+        "h": camera.height,
+        "transform_matrix": (world_from_opengl.matrix() + 0.0).tolist(),
+    }
+
+
+def _entry(path: Path, k: int, frame: Any) -> tuple[str, Pose]:
+    name = frame.get("file_path") if isinstance(frame, dict) else None
+    rows = frame.get("transform_matrix") if isinstance(frame, dict) else None
+    if not isinstance(name, str) or not isinstance(rows, list):
+        raise ReadError(f"{path}: frame {k}: lacks file_path or transform_matrix; write it anew")
+    flat = [x for row in rows for x in (row if isinstance(row, list) else [row])]
+    if not all(type(x) in (int, float) for x in flat):
+        raise ReadError(f"{path}: {name}: the matrix holds what is no number; write it anew")
+    pose = parse_pose(path, name, flat)
+    return name.removeprefix("./").removeprefix(_FOLDER), pose @ _SENSOR_FROM_OPENGL.inverse()

@@ -1,0 +1,384 @@
+"""``scanweld export`` and ``scanweld fuse`` as users meet them."""
+
+import dataclasses
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from scanweld.app import job
+from scanweld.app.cli import main
+from scanweld.evaluation.primitives import box
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.camera import CameraModel
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.io import (
+    PoseSet,
+    read_mesh,
+    read_poses,
+    read_scan,
+    write_mesh_ply,
+    write_poses,
+    write_scan_ply,
+)
+from scanweld.io.ply_body import decode_body
+from scanweld.io.ply_header import parse_header
+from scanweld.io.pose_formats import FORMATS, Frame, match_poses, read_any_poses
+from tests.results import stub_run
+from tests.scenes import Scene, primitive_scene, scene_of
+
+NAMES = ["scan_01", "scan_02", "scan_03", "scan_04"]
+EVERY_POSE = [word for form in FORMATS for word in ("--poses", form)]
+
+
+@pytest.fixture(scope="session")
+def scene() -> Scene:
+    return primitive_scene("box", pixels=70.0)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def model(scene: Scene) -> Path:
+    """A model in the folder ``model`` of scans in the folder ``scans``."""
+    Path("scans").mkdir()
+    for scan in scene.scans:
+        write_scan_ply(Path("scans") / f"{scan.name}.ply", scan)
+    folder = Path("model")
+    folder.mkdir()
+    poses = scene.world_from_scan
+    write_poses(folder / "poses.json", PoseSet(poses=poses, components=(tuple(poses),)))
+    write_mesh_ply(folder / "model.ply", scene.mesh)
+    files = {name: {"file": f"../scans/{name}.ply"} for name in poses}
+    (folder / "report.json").write_text(json.dumps({"format": 1, "scans": files}))
+    (folder / "config.toml").write_text("unit = 'mm'\n")
+    return folder
+
+
+def scanweld(*arguments: str | Path) -> int:
+    with pytest.raises(SystemExit) as left:
+        main([str(argument) for argument in arguments])
+    assert isinstance(left.value.code, int)
+    return left.value.code
+
+
+def error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    assert line.startswith("scanweld: error: ")
+    return line
+
+
+def snapshot() -> dict[str, bytes | None]:
+    return {str(p): p.read_bytes() if p.is_file() else None for p in sorted(Path().rglob("*"))}
+
+
+def points_of(path: Path) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    data = path.read_bytes()
+    header = parse_header(path, data)
+    vertex = decode_body(header, data)["vertex"]
+    points = np.stack([np.asarray(vertex[key]) for key in "xyz"], axis=1)
+    return points, np.asarray(vertex["scan"]), header.comments
+
+
+def test_everything_at_once(model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]):
+    models = [word for form in ("ply", "obj", "stl", "glb") for word in ("--model", form)]
+    assert scanweld("export", model, *EVERY_POSE, *models, "--points", "all.ply", "-o", "out") == 0
+    (line,) = capsys.readouterr().out.splitlines()  # nothing to be noted
+    names = [
+        path.relative_to("out").as_posix() for path in Path("out").rglob("*") if path.is_file()
+    ]
+    assert line.startswith("out: ") and set(line[5:].split(", ")) == set(names)
+    assert {"poses.mlp", "colmap/cameras.txt", "transforms.json", "model.glb", "all.ply"} < set(
+        names
+    )
+    for name in ("poses.conf", "poses.mlp", "poses.aln", "poses.tum.txt", "posegraph.json"):
+        check(Path("out") / name, scene)
+    for name in ("transforms.json", "colmap/images.txt", "colmap", "cloudcompare"):
+        check(Path("out") / name, scene)
+    assert Path("out/model.ply").read_bytes() == (model / "model.ply").read_bytes()
+    for form in ("obj", "stl"):
+        again = read_mesh(Path(f"out/model.{form}"))
+        close = np.abs(again.vertices[again.faces] - scene.mesh.vertices[scene.mesh.faces])
+        assert close.max() < 1e-4
+
+
+def check(path: Path, scene: Scene) -> None:
+    """The poses in a file are those of the scene."""
+    found = read_any_poses(path)
+    poses = match_poses(path, found, NAMES)
+    for k, scan in enumerate(scene.scans):
+        is_scan = found.frame is Frame.SCAN
+        want = scene.world_from_scan[scan.name] if is_scan else scene.views[k].world_from_sensor
+        assert np.abs(poses[scan.name].matrix() - want.matrix()).max() < 1e-9, path
+
+
+def test_colmap_opens_the_model_and_sees_points_where_the_sensors_did(model: Path, scene: Scene):
+    pycolmap = pytest.importorskip("pycolmap")
+    assert scanweld("export", model, "--poses", "colmap", "-o", "out") == 0
+    opened = pycolmap.Reconstruction("out/colmap")
+    images = {image.name: image for image in opened.images.values()}
+    for k, scan in enumerate(scene.scans):
+        image, view = images[f"{scan.name}.png"], scene.views[k]
+        want = view.world_from_sensor.inverse().matrix()[:3]
+        assert np.allclose(image.cam_from_world().matrix(), want, atol=1e-9)
+        seen = view.world_from_sensor.inverse().apply(
+            scene.world_from_scan[scan.name].apply(scan.points[:1])
+        )
+        pixel = opened.cameras[image.camera_id].img_from_cam(seen[0])
+        assert np.allclose(pixel, view.camera.project(seen)[0][0] + 0.5)
+
+
+def test_files_are_named_as_seen_from_the_poses(model: Path):
+    assert scanweld("export", model, "--poses", "aln", "-o", "far/away/out") == 0
+    lines = Path("far/away/out/poses.aln").read_text().splitlines()
+    assert lines[1] == "../../../scans/scan_01.ply"
+    assert (Path("far/away/out") / lines[1]).is_file()
+
+
+def test_points_lie_together_and_know_their_scan(model: Path, scene: Scene):
+    assert scanweld("export", model, "--points", "merged.ply", "-o", "out") == 0
+    points, labels, comments = points_of(Path("out/merged.ply"))
+    assert comments == tuple(f"scan {k} = {name}" for k, name in enumerate(NAMES))
+    counts = [len(scan.points) for scan in scene.scans]
+    assert np.bincount(labels).tolist() == counts
+    for k, scan in enumerate(scene.scans):
+        assert np.allclose(points[labels == k], scene.world_from_scan[scan.name].apply(scan.points))
+    assert read_scan("out/merged.ply").colors is None
+
+
+def test_colours_in_some_scans_only_are_said(model: Path, capsys: pytest.CaptureFixture[str]):
+    scan = read_scan("scans/scan_02.ply")
+    red = np.tile(np.array([200, 0, 0], np.uint8), (len(scan.points), 1))
+    write_scan_ply("scans/scan_02.ply", dataclasses.replace(scan, colors=red))
+    assert scanweld("export", model, "--points", "merged.ply", "-o", "out") == 0
+    (_, note) = capsys.readouterr().out.splitlines()
+    assert note.endswith("scan_01, scan_03, scan_04")
+    _, labels, _ = points_of(Path("out/merged.ply"))
+    colors = read_scan("out/merged.ply").colors
+    assert colors is not None
+    assert (colors[labels == 1] == [200, 0, 0]).all() and (colors[labels != 1] == 128).all()
+
+
+def test_unit_of_the_glb(model: Path, capsys: pytest.CaptureFixture[str]):
+    assert scanweld("export", model, "--model", "glb", "-o", "known") == 0
+    assert "note" not in capsys.readouterr().out
+    (model / "config.toml").unlink()
+    assert scanweld("export", model, "--model", "glb", "-o", "unknown") == 0
+    (_, note) = capsys.readouterr().out.splitlines()
+    assert "unit" in note and "--unit" in note
+    assert scanweld("export", model, "--model", "glb", "--unit", "mm", "-o", "said") == 0
+    assert "note" not in capsys.readouterr().out
+    known, unknown, said = (Path(d, "model.glb").read_bytes() for d in ("known", "unknown", "said"))
+    assert known == said != unknown
+    assert scanweld("export", model, "--model", "glb", "--up", "-z", "-o", "turned") == 0
+    assert Path("turned/model.glb").read_bytes() != known
+
+
+def test_other_components_and_unplaced_scans_are_said(
+    model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
+):
+    poses = {name: scene.world_from_scan[name] for name in NAMES[:3]}
+    components = (("scan_01", "scan_02"), ("scan_03",))
+    told = PoseSet(poses=poses, components=components, unplaced={"scan_04": "too far"})
+    write_poses(model / "poses.json", told)
+    assert scanweld("export", model, "--poses", "cloudcompare", "-o", "a") == 0
+    (_, first, second) = capsys.readouterr().out.splitlines()
+    assert "component 1 of 2" in first and "scan_04" in second
+    assert {path.stem for path in Path("a/cloudcompare").iterdir()} == {"scan_01", "scan_02"}
+    assert scanweld("export", model, "--poses", "cloudcompare", "--component", "2", "-o", "b") == 0
+    assert {path.stem for path in Path("b/cloudcompare").iterdir()} == {"scan_03"}
+
+
+def test_scans_that_moved_are_found_where_said(model: Path, capsys: pytest.CaptureFixture[str]):
+    shutil.move("scans", "moved")
+    before = snapshot()
+    assert scanweld("export", model, "--poses", "tum", "-o", "out") == 1
+    assert "scan_01: its file is not where" in (line := error_line(capsys)) and "--scans" in line
+    assert snapshot() == before
+    assert scanweld("export", model, "--poses", "tum", "-o", "out", "--scans", "moved") == 0
+    assert scanweld("export", model, "--poses", "open3d", "-o", "more") == 0  # needs no files
+
+
+def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[str]):
+    views = [
+        view_of(box(), 90.0 * k, 25, pixels=70, model=CameraModel.ORTHOGRAPHIC) for k in range(4)
+    ]
+    for scan in scene_of(box(), views).scans:
+        write_scan_ply(Path("scans") / f"{scan.name}.ply", scan)
+    before = snapshot()
+    for form in ("tum", "colmap", "nerfstudio"):
+        assert scanweld("export", model, "--poses", "mlp", "--poses", form, "-o", "out") == 1
+        assert "scan_01: its sensor is orthographic" in error_line(capsys)
+    assert snapshot() == before
+    Path("tum.txt").write_text("".join(f"{k} 0 0 0 0 0 0 1\n" for k in range(4)))
+    assert scanweld("fuse", "scans", "--poses", "tum.txt", "-o", "fused", "-q") == 1
+    assert "its sensor is orthographic, and TUM speaks of pinholes only" in error_line(capsys)
+    assert not Path("fused").exists()
+
+
+@pytest.mark.parametrize(
+    ("break_it", "arguments", "says"),
+    [
+        ("", [], "nothing to export"),
+        ("", ["--points", "merged.xyz"], "merged.xyz: points are written as PLY"),
+        ("", ["--points", "../merged.ply"], "points are written as PLY"),
+        ("", ["--points", "model.ply", "--model", "ply"], "is the model's name"),
+        ("", ["--poses", "mlp", "--component", "2"], "has no component 2"),
+        ("poses.json", ["--model", "glb"], "holds no poses.json"),
+        ("model.ply", ["--poses", "mlp", "--model", "glb"], "holds no model.ply"),
+        ("report.json", ["--poses", "conf"], "scan_01: its file is not where"),
+        ("config.toml=[pairs", ["--model", "glb"], "config.toml"),
+        ("report.json={", ["--poses", "mlp"], "report.json: not valid JSON"),
+        ("report.json={}", ["--poses", "mlp"], "report.json: scans: field required"),
+        ("poses.json=[]", ["--poses", "mlp"], "poses.json"),
+        ('poses.json={"format": 1, "scans": {}}', ["--poses", "mlp"], "no scan is placed"),
+        ("no faces", ["--model", "stl"], "has no faces"),
+        ("no faces", ["--model", "ply"], "has no faces"),
+        ("model.ply=ply", ["--model", "obj"], "model.ply"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(
+    model: Path, break_it: str, arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
+):
+    name, equals, text = break_it.partition("=")
+    if break_it == "no faces":
+        bare = TriangleMesh(vertices=np.eye(3), faces=np.zeros((0, 3), np.int64))
+        write_mesh_ply(model / "model.ply", bare)
+    elif equals:
+        (model / name).write_text(text)
+    elif name:
+        (model / name).unlink()
+    before = snapshot()
+    assert scanweld("export", model, *arguments, "-o", "out") == 1
+    assert says in error_line(capsys)
+    assert snapshot() == before
+
+
+def test_no_output_is_replaced_unasked_and_no_input_ever(
+    model: Path, capsys: pytest.CaptureFixture[str]
+):
+    for output in (model, Path("scans")):
+        before = snapshot()
+        assert scanweld("export", model, "--poses", "mlp", "-o", output, "--force") == 1
+        assert "holds the input" in error_line(capsys)
+        assert snapshot() == before
+    Path("full").mkdir()
+    Path("full/mine").touch()
+    assert scanweld("export", model, "--poses", "mlp", "-o", "full") == 1
+    assert "--force" in error_line(capsys)
+
+
+@pytest.mark.parametrize("option", [["--poses", "fbx"], ["--model", "fbx"], ["--up", "w"]])
+def test_an_unknown_format_is_wrong_usage_and_told_the_known(
+    model: Path, option: list[str], capsys: pytest.CaptureFixture[str]
+):
+    assert scanweld("export", model, *option, "-o", "out") == 2
+    told = capsys.readouterr().err
+    assert repr(option[1]) in told and ("mlp" in told or "glb" in told or "-z" in told)
+    assert not Path("out").exists()
+
+
+def test_every_format_and_file_is_documented(model: Path):
+    text = (Path(__file__).parents[1] / "docs/formats.md").read_text(encoding="utf-8")
+    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
+    names = {path.name for path in Path("out").rglob("*.*")}
+    for word in {*FORMATS, "ply", "obj", "stl", "glb"}:
+        assert f"| `{word}` |" in text
+    for name in {name for name in names if not name.startswith("scan_")}:
+        assert name in text, name
+
+
+def test_a_run_tells_where_its_scans_are(model: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(job.pipeline, "run", stub_run)
+    assert scanweld("run", "scans", "-o", "there/result") == 0
+    assert scanweld("export", "there/result", "--poses", "mlp", "-o", "there/out") == 0
+    assert "../../scans/scan_01.ply" in Path("there/out/poses.mlp").read_text()
+
+
+# scanweld fuse
+
+
+def distance_to_truth(scene: Scene, mesh: TriangleMesh) -> float:
+    """Share of the diameter within which 95 % of the posed scans' points lie from the mesh."""
+    points = np.concatenate([scene.world_from_scan[s.name].apply(s.points) for s in scene.scans])
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return float(np.quantile(KDTree(mesh.vertices).query(points)[0], 0.95)) / size
+
+
+@pytest.mark.parametrize("form", ["poses.json", "poses.tum.txt", "poses.mlp", "transforms.json"])
+def test_known_poses_are_fused_in_their_frame(
+    model: Path, scene: Scene, form: str, capsys: pytest.CaptureFixture[str]
+):
+    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
+    poses = model / form if form == "poses.json" else Path("out") / form
+    assert scanweld("fuse", "scans", "--poses", poses, "-o", "fused", "-q", "--unit", "mm") == 0
+    assert "given: all 4 scans are fused" in capsys.readouterr().out
+    assert distance_to_truth(scene, read_mesh("fused/model.ply")) < 0.02
+    found = read_poses("fused/poses.json").poses
+    for name, pose in scene.world_from_scan.items():
+        assert np.abs(found[name].matrix() - pose.matrix()).max() < 1e-9
+    # What fuse makes is a model like any other, but that it says nothing of pairs.
+    page = Path("fused/report.html").read_text(encoding="utf-8")
+    assert "All 4 scans are fused with the poses that were given." in page
+    assert 'id="residuals"' in page and 'id="graph"' not in page and 'id="contours"' not in page
+    assert scanweld("report", "fused") == 0
+    assert Path("fused/report.html").read_text(encoding="utf-8") == page
+    assert scanweld("export", "fused", "--poses", "conf", "--model", "glb", "-o", "again") == 0
+    assert Path("again/poses.conf").read_text() and "note" not in capsys.readouterr().out
+
+
+def test_scans_without_a_pose_are_left_out_and_named(
+    model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
+):
+    poses = {name: scene.world_from_scan[name].matrix().tolist() for name in NAMES[:3]}
+    Path("some.json").write_text(json.dumps(poses))
+    assert scanweld("fuse", "scans", "--poses", "some.json", "-o", "fused", "-q") == 3
+    told = capsys.readouterr().out
+    assert "partial: 3 of 4 scans" in told and "unplaced scan_04: no pose in some.json" in told
+    assert read_poses("fused/poses.json").unplaced == {"scan_04": "no pose in some.json"}
+    assert set(read_poses("fused/poses.json").poses) == set(NAMES[:3])
+
+
+@pytest.mark.parametrize(
+    ("poses", "says"),
+    [
+        ("missing.json", "missing.json: cannot be read"),
+        ("prose.txt", "prose.txt: unknown format of poses"),
+        ("strange.json", "none of its 1 poses"),
+        ("single.json", "1 usable scan"),
+        ("three.txt", "3 poses for 4 scans"),
+        ("out", "holds no CloudCompare matrices"),
+    ],
+)
+def test_bad_poses_are_one_line_and_nothing_is_written(
+    model: Path, poses: str, says: str, capsys: pytest.CaptureFixture[str]
+):
+    rows = Pose.identity().matrix().tolist()
+    Path("prose.txt").write_text("once upon a time\n")
+    Path("strange.json").write_text(json.dumps({"x": rows}))
+    Path("single.json").write_text(json.dumps({"scan_01": rows}))
+    Path("three.txt").write_text("".join(f"{k} 0 0 0 0 0 0 1\n" for k in range(3)))
+    Path("out").mkdir()
+    before = snapshot()
+    assert scanweld("fuse", "scans", "--poses", poses, "-o", "fused", "-q") == 1
+    assert says in error_line(capsys)
+    assert snapshot() == before
+
+
+def test_poses_are_no_place_for_the_output(model: Path, capsys: pytest.CaptureFixture[str]):
+    assert scanweld("export", model, "--poses", "cloudcompare", "-o", "out") == 0
+    capsys.readouterr()
+    before = snapshot()
+    folder = "out/cloudcompare"
+    assert scanweld("fuse", "scans", "--poses", folder, "-o", folder, "-q", "--force") == 1
+    assert "holds the input" in error_line(capsys)
+    assert snapshot() == before

@@ -1,0 +1,474 @@
+"""report.html: whole, by itself, the same every time, and true to the files beside it."""
+
+import dataclasses
+import json
+import re
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scanweld.app import job
+from scanweld.app.cli import main
+from scanweld.app.html_report import numbers, write_html_report
+from scanweld.app.html_report.buffers import box_around, packed, quantised, steps
+from scanweld.app.html_report.colors import scan_colors
+from scanweld.app.html_report.definitions import DEFINITIONS
+from scanweld.app.html_report.histogram import histogram
+from scanweld.app.html_report.page import scan_looks
+from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
+from scanweld.app.html_report.sources import Sources
+from scanweld.app.html_report.surface_check import check_surface, open_borders, thin_share
+from scanweld.app.html_report.view_graph import draw_graph, pair_level, round_order
+from scanweld.app.model_files import PairEntry
+from scanweld.app.model_folder import open_model
+from scanweld.app.outputs import write_outputs
+from scanweld.config import Config, FusionConfig, PrepareConfig
+from scanweld.errors import InputError, ReadError
+from scanweld.evaluation.primitives import sphere
+from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.io import write_scan_ply
+from scanweld.pairs.result import PairKind
+from scanweld.pairs.slippage import Slide
+from scanweld.prepare.support import find_support
+from scanweld.reconstruction import FactReport, FactVerdict, ScanVerdict
+from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
+from tests.results import a_pair, a_result, no_pair
+from tests.test_support import on_table, seen
+
+VOID = {"meta", "link", "img", "br", "input", "hr", "col"}
+
+
+class Page(HTMLParser):
+    """Elements with their attributes and text; refuses tags that are not closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.text: dict[str, str] = {}
+        self.words: list[str] = []
+        self._open: list[str] = []
+        self._id = ""
+        self.feed(text)
+        self.close()
+        assert not self._open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = {key: value or "" for key, value in attrs}
+        self.elements.append((tag, found))
+        self._id = found.get("id", "")
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {key: value or "" for key, value in attrs}))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open and self._open.pop() == tag, f"</{tag}> at {self.getpos()}"
+
+    def handle_data(self, data: str) -> None:
+        if self._id:
+            self.text[self._id] = self.text.get(self._id, "") + data
+        if self._open and self._open[-1] not in ("script", "style"):
+            self.words.append(data)
+
+    def values(self) -> set[str]:
+        """All exact numbers that stand beside those that are shown."""
+        return {found["data-value"] for _, found in self.elements if "data-value" in found}
+
+
+def page_of(folder: Path) -> Page:
+    return Page((folder / "report.html").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    made = whole_folder(tmp_path_factory.mktemp("whole") / "model")
+    write_html_report(made.folder, made.scans)
+    return made
+
+
+@pytest.fixture(scope="module")
+def page(made: Made) -> Page:
+    return page_of(made.folder)
+
+
+def test_page_is_well_formed_and_needs_nothing_else(made: Made, page: Page):
+    text = (made.folder / "report.html").read_text(encoding="utf-8")
+    assert text.startswith("<!doctype html>")
+    assert not re.search(r"(?:https?:)?//[a-z]+\.[a-z]", text)
+    for _, found in page.elements:
+        for key in ("src", "href"):
+            assert found.get(key, "#").startswith(("#", "data:")), found
+    ids = [found["id"] for _, found in page.elements if "id" in found]
+    assert len(ids) == len(set(ids))
+    for _, found in page.elements:
+        if found.get("href", "").startswith("#"):
+            assert found["href"][1:] in ids
+    assert "@import" not in text and "url(" not in text
+
+
+def test_pictures_have_words(page: Page):
+    pictures = [found for tag, found in page.elements if tag == "img"]
+    assert len(pictures) == 3 + 2 + 3
+    assert all(found["alt"] for found in pictures)
+    drawings = [found for tag, found in page.elements if tag in ("svg", "canvas")]
+    assert len(drawings) >= 4 and all(found["aria-label"] for found in drawings)
+
+
+def test_numbers_are_those_of_the_files(made: Made, page: Page):
+    report = json.loads((made.folder / "report.json").read_text())
+    graph = json.loads((made.folder / "graph.json").read_text())
+    for name, scan in report["scans"].items():
+        wanted = {repr(scan["overlap"]), repr(scan["rms"]), str(scan["num_points"])}
+        assert wanted <= page.values(), name
+    stages = report["stages"]["pairs"]
+    assert {repr(stages["seconds"]), repr(stages["peak_mb"])} <= page.values()
+    shown = json.loads(page.text["pairs-data"])
+    assert len(shown) == len(graph["pairs"])
+    for pair, found in zip(graph["pairs"], shown, strict=True):
+        assert found.items() <= {"confidence": None, **pair}.items()
+    assert f"All {len(report['scans'])} scans are placed." in page.words
+
+
+def test_same_files_give_the_same_bytes(made: Made):
+    before = (made.folder / "report.html").read_bytes()
+    write_html_report(made.folder, dict(reversed(made.scans.items())))
+    assert (made.folder / "report.html").read_bytes() == before
+
+
+def test_every_number_is_defined_in_the_words_of_the_documentation(page: Page):
+    asked = {found["data-def"] for _, found in page.elements if "data-def" in found}
+    assert asked <= set(DEFINITIONS)
+    told = (Path(__file__).parents[1] / "docs/report.md").read_text(encoding="utf-8")
+    told = " ".join(told.replace("`", "").split())
+    for key, definition in DEFINITIONS.items():
+        assert definition.meaning in told, key
+
+
+def test_true_scans_lie_on_the_model(made: Made, page: Page):
+    scene = small_scene()
+    points = {
+        scan.name: scene.world_from_scan[scan.name].apply(scan.points) for scan in scene.scans
+    }
+    check = check_surface(scene.mesh, points)
+    assert check.off_model == 0
+    # Vertices stand for their surroundings, so on a curved surface the residual is not quite 0.
+    found = histogram(check.all_distances())
+    assert found is not None and found.median < 2e-3 * np.ptp(scene.mesh.vertices)
+    assert repr(found.median) in page.values()
+    seen = check.support[check.support > 0]
+    assert check.support.max() <= 4 and 1 <= np.median(seen) <= 2  # of four views from around
+
+
+@pytest.mark.parametrize("left_out", [True, False])
+def test_a_table_that_was_left_out_is_not_measured(tmp_path: Path, left_out: bool):
+    scan = seen(on_table(), 0.0)
+    result = a_result([scan.name])
+    told = dataclasses.replace(result.scans[scan.name], is_without_support=left_out)
+    folder = written(tmp_path, dataclasses.replace(result, scans={scan.name: told}))
+    sources = Sources(open_model(folder), {scan.name: scan}, PrepareConfig())
+    points = sources.points_of_model()[scan.name]
+    assert (len(points) == len(scan.points)) is not left_out
+    spacing = sources.prepared(scan.name).resolution
+    assert (find_support(points, spacing) is None) is left_out
+    assert sources.prepared(scan.name).is_without_support is left_out
+
+
+@pytest.mark.parametrize("with_doubtful", [False, True])
+def test_residuals_are_of_the_scans_that_the_model_was_made_of(tmp_path: Path, with_doubtful: bool):
+    scene = small_scene()
+    result = good_result(scene)
+    config = Config(fusion=FusionConfig(with_doubtful=with_doubtful))
+    doubtful = dataclasses.replace(result.scans["scan_02"], verdict=ScanVerdict.DOUBTFUL)
+    scans = {**result.scans, "scan_02": doubtful}
+    folder = written(tmp_path, dataclasses.replace(result, scans=scans, config=config))
+    write_html_report(folder, {scan.name: scan for scan in scene.scans})
+    page = page_of(folder)
+    shown = [found for _, found in page.elements if "data-scan" in found]
+    assert len(shown) == (4 if with_doubtful else 3)
+    assert any(f"The fused surface of {len(shown)} scans" in words for words in page.words)
+
+
+def test_residual_and_support_of_a_ball_measured_too_large():
+    ball = sphere(50.0)
+    outside = ball.vertices * 1.01
+    upper = outside[outside[:, 2] > 0]
+    check = check_surface(ball, {"all": outside, "upper": upper})
+    assert np.allclose(check.distances["all"], 0.5, atol=1e-3)
+    top, bottom = ball.vertices[:, 2] > 5, ball.vertices[:, 2] < -5
+    assert set(check.support[top]) == {2} and set(check.support[bottom]) == {1}
+    assert thin_share(ball, check.support) == pytest.approx(0.5, abs=0.03)
+    # Where the model knows, nothing is measured anew: its vertices may be closer than points are.
+    told = dataclasses.replace(ball, support=np.full(len(ball.vertices), 3))
+    assert set(check_surface(told, check.points).support) == {3}
+    assert np.allclose(check.residual, 0.5, atol=1e-3)
+    far = check_surface(ball, {"far": ball.vertices * 3})
+    assert far.off_model == 1 and not len(far.all_distances()) and np.isnan(far.residual).all()
+
+
+def test_a_hole_is_found_and_measured():
+    ball = sphere(50.0)
+    kept = (ball.vertices[ball.faces][..., 2] < 40).all(axis=1)
+    cut = TriangleMesh(vertices=ball.vertices, faces=ball.faces[kept])
+    borders = open_borders(cut)
+    assert open_borders(ball).num_holes == 0
+    assert borders.num_holes == 1
+    around = 2 * np.pi * 30  # of the circle at height 40, along which the border zigzags
+    assert around < borders.length < 1.4 * around
+    assert borders.longest == pytest.approx(borders.length)
+
+
+def test_thinned_mesh_keeps_the_shape():
+    ball = sphere(50.0)
+    cluster = cluster_vertices(ball.vertices, 2000)
+    vertices = cluster_means(cluster, ball.vertices)
+    faces = cluster_faces(cluster, ball.faces)
+    assert 500 < len(vertices) <= 2000 and faces.max() < len(vertices)
+    assert np.allclose(np.linalg.norm(vertices, axis=1), 50, rtol=0.01)
+    areas = np.linalg.norm(face_normals(vertices, faces), axis=1) / 2
+    assert areas.sum() == pytest.approx(4 * np.pi * 50**2, rel=0.02)
+    assert np.array_equal(cluster_vertices(ball.vertices, 10**6), np.arange(len(ball.vertices)))
+
+
+def test_buffers_keep_coordinates_to_a_step_and_lie_at_multiples_of_their_size():
+    points = np.random.default_rng(0).uniform(-3, 9, (101, 3))
+    box = box_around([points])
+    back = (quantised(points, box) / 65535 - 0.5) * 2 * box.half + np.array(box.centre)
+    assert np.abs(back - points).max() < box.half / 65535 * 1.01
+    index, _ = packed({"a": np.arange(3, dtype=np.uint8), "b": steps(np.array([[5, 2], [9, 9]]))})
+    assert index["b"] == {"type": "int32", "offset": 4, "length": 4}
+    assert steps(np.array([5, 2, 9])).tolist() == [5, -3, 7]
+
+
+def test_without_the_scans_the_page_says_what_is_missing(tmp_path: Path):
+    made = whole_folder(tmp_path / "model")
+    write_html_report(made.folder)
+    page = page_of(made.folder)
+    assert sum("can be measured only with the scans" in words for words in page.words) == 4
+    assert len([tag for tag, _ in page.elements if tag == "img"]) == 3
+    modes = [found["value"] for tag, found in page.elements if tag == "input"]
+    assert modes == ["model"]
+
+
+ODD = ['</script><script>alert("x")</script>', "a&b <i>", "'quoted\"", "{{ 7 * 7 }}", "überзл 扫描"]
+
+
+def test_odd_names_are_only_text(tmp_path: Path):
+    folder = written(tmp_path, a_result(ODD[:3], {ODD[3]: "<b>no</b>", ODD[4]: "empty"}))
+    write_html_report(folder)
+    page = page_of(folder)
+    tags = [tag for tag, _ in page.elements]
+    assert tags.count("script") == 4 and "b" not in tags
+    for name in ODD:
+        assert name in page.words
+    assert {pair["i"] for pair in json.loads(page.text["pairs-data"])} <= set(ODD)
+
+
+def test_nothing_placed(tmp_path: Path):
+    result = a_result([], {"a": "shows no surface", "b": "too few points"})
+    write_html_report(written(tmp_path, result), {})
+    page = page_of(tmp_path)
+    assert "No two of the 2 scans could be brought together." in page.words
+    assert "canvas" not in [tag for tag, _ in page.elements]
+    assert any("shows no surface" in words for words in page.words)
+
+
+def test_one_placed_scan_and_pairs_without_numbers(tmp_path: Path):
+    result = a_result(["a"], {"b": "fits nowhere"})
+    result = dataclasses.replace(result, pairs=(no_pair("a", "b"),))
+    write_html_report(written(tmp_path, result))
+    assert "1 of 2 scans are placed." in page_of(tmp_path).words
+
+
+def test_sixty_scans(tmp_path: Path):
+    names = [f"turn_{k:02d}" for k in range(60)]
+    folder = crowd(tmp_path, names)
+    write_html_report(folder)
+    page = page_of(folder)
+    cells = [found for tag, found in page.elements if tag == "td" and "data-pair" in found]
+    assert len(cells) == 60 * 59 and all(found["title"] for found in cells)
+    assert (folder / "report.html").stat().st_size < 4e6
+
+
+def test_several_components_are_told_apart(tmp_path: Path):
+    result = dataclasses.replace(
+        a_result(["a", "b", "c", "d"]), components=(("a", "b"), ("d", "c"))
+    )
+    write_html_report(written(tmp_path, result))
+    words = page_of(tmp_path).words
+    assert any("in 2 separate components" in each for each in words)
+    assert any("Component 2" in each for each in words) and "reference d" in words
+
+
+def test_what_was_known_beforehand_is_shown_with_what_became_of_it(tmp_path: Path):
+    facts = (
+        FactReport(fact="fix a", verdict=FactVerdict.HELD, reason="a: its frame is the world"),
+        FactReport(fact="apart a b", verdict=FactVerdict.CONTRADICTED, reason="they are one"),
+    )
+    folder = written(tmp_path, dataclasses.replace(a_result(["a", "b"]), knowledge=facts))
+    write_html_report(folder)
+    page = page_of(folder)
+    assert "Known beforehand" in page.words
+    assert {"fix a", " held: a: its frame is the world"} <= set(page.words)
+    assert {"apart a b", " contradicted: they are one"} <= set(page.words)
+    assert any(found.get("class") == "contradicted" for _, found in page.elements)
+
+
+def test_pairs_are_drawn_by_confidence_where_there_is_one():
+    told = {"kind": "good", "accepted": True, "reason": "", "overlap": 0.5, "evidence": None}
+    told |= {"i": "a", "j": "b", "margin": 1.0, "observability": 0.1, "score": 0.6}
+    assert pair_level(PairEntry.model_validate(told)) == 4
+    assert pair_level(PairEntry.model_validate({**told, "score": None})) == 0
+    assert pair_level(PairEntry.model_validate({**told, "confidence": 0.5})) == 2
+
+
+def test_what_a_pair_slides_like_is_shown(tmp_path: Path):
+    sliding = dataclasses.replace(a_pair("a", "b"), kind=PairKind.SLIDING, sliding=Slide.CYLINDER)
+    folder = written(tmp_path, dataclasses.replace(a_result(["a", "b"]), pairs=(sliding,)))
+    write_html_report(folder)
+    told = [found["title"] for _, found in page_of(folder).elements if "title" in found]
+    assert any("alone: sliding (cylinder), score" in words for words in told)
+    assert json.loads(page_of(folder).text["pairs-data"])[0]["sliding"] == "cylinder"
+
+
+def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
+    folder = written(tmp_path, good_result(small_scene()))
+    for name, key in (("report.json", "scans"), ("graph.json", "pairs")):
+        content = json.loads((folder / name).read_text())
+        entries = content[key].values() if key == "scans" else content[key]
+        for entry in entries:
+            entry["confidence"] = 0.98765
+        (folder / name).write_text(json.dumps(content))
+    write_html_report(folder)
+    page = page_of(folder)
+    assert "0.98765" in page.values() and "98.8\u00a0%" in page.words
+    assert all(pair["confidence"] == 0.98765 for pair in json.loads(page.text["pairs-data"]))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("report.json", None, "report.json: is missing"),
+        ("graph.json", "[1, 2", "graph.json: not valid JSON"),
+        ("graph.json", '{"format": 7, "pairs": []}', "graph.json: format"),
+        ("poses.json", None, "holds no poses.json"),
+        ("report.json", '{"format": 1}', "report.json: verdict: field required"),
+        ("model.ply", "ply\nformat", "model.ply"),
+    ],
+)
+def test_a_broken_folder_is_told_in_a_line(
+    tmp_path: Path, name: str, content: str | None, told: str
+):
+    folder = whole_folder(tmp_path).folder
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_text(content)
+    with pytest.raises(ReadError) as caught:
+        write_html_report(folder)
+    assert told in str(caught.value) and "\n" not in str(caught.value)
+    assert not (folder / "report.html").exists()
+
+
+def test_files_of_different_runs_are_refused(tmp_path: Path):
+    folder = whole_folder(tmp_path / "a").folder
+    other = written(tmp_path / "b", a_result(["x", "y"]))
+    (other / "poses.json").replace(folder / "poses.json")
+    with pytest.raises(ReadError, match="does not know the scan 'x'"):
+        write_html_report(folder)
+
+
+def test_other_scans_are_refused(tmp_path: Path):
+    made = whole_folder(tmp_path)
+    first, *others = made.scans
+    with pytest.raises(InputError, match="has a pose but is not among"):
+        write_html_report(made.folder, {name: made.scans[name] for name in others})
+    with pytest.raises(InputError, match="is not the scan that"):
+        write_html_report(made.folder, {**made.scans, first: made.scans[others[0]]})
+
+
+def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene = small_scene()
+    scans = tmp_path / "scans"
+    scans.mkdir()
+    for scan in scene.scans:
+        write_scan_ply(scans / f"{scan.name}.ply", scan)
+    read, _ = job.read_all(job.collect([scans]))
+    result = good_result(dataclasses.replace(scene, scans=tuple(read)))
+    folder = written(tmp_path / "model", result)
+    assert run("report", folder, "--scans", scans) == 0
+    assert capsys.readouterr().out.strip() == str(folder / "report.html")
+    assert num_pictures(folder) == 8
+    assert run("report", folder) == 0  # where they are, this folder does not say
+    assert num_pictures(folder) == 3
+    write_outputs(result, folder, {scan.name: f"../scans/{scan.name}.ply" for scan in read})
+    assert run("report", folder) == 0
+    assert num_pictures(folder) == 8
+    assert run("report", folder, "--scans", scans / f"{read[0].name}.ply") == 1
+    assert "its file is not among the scans given" in capsys.readouterr().err
+    (folder / "graph.json").unlink()
+    assert run("report", folder) == 1
+    assert capsys.readouterr().err.startswith("scanweld: error: ")
+    assert run("report", tmp_path / "none") == 1
+
+
+def num_pictures(folder: Path) -> int:
+    return len([tag for tag, _ in page_of(folder).elements if tag == "img"])
+
+
+def run(*arguments: str | Path) -> int:
+    with pytest.raises(SystemExit) as left:
+        main([str(argument) for argument in arguments])
+    assert isinstance(left.value.code, int)
+    return left.value.code
+
+
+def test_scans_of_one_side_stand_together():
+    names = [f"s{k}" for k in range(12)]
+    shuffled = [names[k] for k in (0, 7, 2, 9, 4, 11, 6, 1, 8, 3, 10, 5)]
+    ring = [
+        dataclasses.replace(a_pair(names[k], names[(k + 1) % 12]), score=0.6) for k in range(12)
+    ]
+    order = round_order(shuffled, ring)  # type: ignore[arg-type]  # has what is asked of a pair
+    gaps = {(int(b[1:]) - int(a[1:])) % 12 for a, b in pairwise(order)}
+    assert gaps in ({1}, {11})
+
+
+def test_labels_are_short_and_numbers_keep_their_zeros():
+    assert [look.label for look in scan_looks(["scan_1", "scan_2", "scan_10"]).values()] == [
+        "1",
+        "2",
+        "10",
+    ]
+    assert [look.label for look in scan_looks(["a_08", "a_09"]).values()] == ["08", "09"]
+    looks = scan_looks(["the first of all", "another one"])
+    assert [look.label for look in looks.values()] == ["1", "2"]
+    assert len(set(scan_colors(60))) == 60
+
+
+def test_the_drawing_has_every_scan_once():
+    drawing = draw_graph([["a", "b"]], ["c"], [])
+    assert sorted(node.name for node in drawing.nodes) == ["a", "b", "c"] and not drawing.links
+
+
+@pytest.mark.parametrize(
+    ("told", "wanted"),
+    [
+        (numbers.share(0.8625), "86\u00a0%"),
+        (numbers.share(None), "–"),
+        (numbers.score(float("nan")), "–"),
+        (numbers.length(0.0005489, None), "0.000549"),
+        (numbers.length(12.345, "mm"), "12.3\u00a0mm"),
+        (numbers.length(0.0000503, "m"), "0.0503\u00a0mm"),
+        (numbers.length(2.76, "m"), "2.76\u00a0m"),
+        (numbers.length(0.0, None), "0"),
+        (numbers.length(1.5e-7, None), "1.50·10⁻⁷"),
+        (numbers.of_diameter(0.5, 250.0), "0.20\u00a0%"),
+        (numbers.duration(61.04), "61.0\u00a0s"),
+        (numbers.duration(404.4), "6 min 44 s"),
+    ],
+)
+def test_numbers_as_people_read_them(told: str, wanted: str):
+    assert told == wanted
