@@ -227,7 +227,7 @@ def test_of_objects_that_slide_nothing_is_asserted(name: str):
 
 
 def test_a_model_that_cannot_be_fused_is_not_passed_over(monkeypatch: pytest.MonkeyPatch):
-    def refuse(*_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         raise InputError("no surface")
 
     monkeypatch.setattr(steps, "fuse", refuse)

@@ -122,6 +122,8 @@ def _by_marks(
     config: PairsConfig,
 ) -> Decided | None:
     """What marks decide among poses that tie."""
+    if not alternatives:
+        return None
 
     def refine(poses: Sequence[Pose]) -> list[Alternative]:
         rows = icp(i, j, pose_rows(list(poses)), schedule, diameter)
