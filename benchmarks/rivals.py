@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from benchmarks.paper.optional import need
 from scanweld.config import PrepareConfig
-from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -58,22 +57,10 @@ def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
     )
 
 
-def open3d() -> ModuleType:
-    """The library.
-
-    Raises:
-        InputError: If it is not installed.
-    """
-    try:
-        import open3d as library
-    except ImportError as error:
-        raise InputError(f"open3d: {error}: run pip install 'scanweld[bench]'") from error
-    return library
-
-
 def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's truncated signed distances, in its grid of voxel blocks; one scan is enough."""
-    core, geometry = open3d().core, open3d().t.geometry
+    library = need("open3d")
+    core, geometry = library.core, library.t.geometry
     grid = geometry.VoxelBlockGrid(
         attr_names=("tsdf", "weight"),
         attr_dtypes=(core.float32, core.float32),
@@ -98,7 +85,7 @@ def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
 
 def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's screened Poisson reconstruction, cut off where there are no points."""
-    o3d = open3d()
+    o3d = need("open3d")
     points = np.concatenate([shape.world_points for shape in shapes])
     normals = np.concatenate([shape.world_from_sensor.turn(shape.normals) for shape in shapes])
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
