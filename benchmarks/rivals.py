@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from benchmarks.paper.optional import need
 from scanweld.config import PrepareConfig
+from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -57,9 +59,16 @@ def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
     )
 
 
+def _open3d() -> ModuleType:
+    try:
+        return import_module("open3d")
+    except ImportError as error:
+        raise InputError(f"open3d: {error}: run pip install 'scanweld[bench]'") from error
+
+
 def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's truncated signed distances, in its grid of voxel blocks; one scan is enough."""
-    library = need("open3d")
+    library = _open3d()
     core, geometry = library.core, library.t.geometry
     grid = geometry.VoxelBlockGrid(
         attr_names=("tsdf", "weight"),
@@ -85,7 +94,7 @@ def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
 
 def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's screened Poisson reconstruction, cut off where there are no points."""
-    o3d = need("open3d")
+    o3d = _open3d()
     points = np.concatenate([shape.world_points for shape in shapes])
     normals = np.concatenate([shape.world_from_sensor.turn(shape.normals) for shape in shapes])
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
