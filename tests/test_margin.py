@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.result import Alternative, Evidence, PairKind, margin_among, refutation_among
+from scanweld.pairs.result import (
+    Alternative,
+    Evidence,
+    PairKind,
+    as_rival,
+    margin_among,
+    refutation_among,
+)
 from scanweld.pairs.verdict import classify_pair
 from tests.results import turned
 
@@ -48,6 +55,11 @@ def test_slivers_are_no_rivals():
 def test_a_rival_as_dirty_as_the_best_pose_counts_in_full():
     best, rival = evidence(0.8, free=0.2), evidence(0.4, free=0.11)
     assert margin(best, [rival]) < 0.1
+
+
+def test_a_place_where_nothing_agrees_is_a_rival_by_its_score_alone():
+    assert as_rival(-0.1, (0.0, 0.0), (0.0, 0.0)) == -0.1
+    assert as_rival(0.2, (0.0, 0.5), (0.0, 0.0)) == 0.2
 
 
 def test_without_rivals_the_margin_is_full_and_without_a_score_none():

@@ -14,12 +14,10 @@ from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.information import information_from, observability_of, two_way_matches
 from scanweld.pairs.register import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
 from scanweld.pairs.result import (
-    AS_CLEAN,
-    CLEAN_SHARE,
     MIN_AGREE,
-    MIN_RIVAL_SHARE,
     MIN_TOLD_SHARE,
     Evidence,
+    as_rival,
     margin_over,
     refutation,
 )
@@ -109,23 +107,16 @@ def _standing(
         worst=0.0,
     )
     rivals = [m for m in merges if not is_near(m.a_from_b, poses[k], centres[k], near)]
-    margin = margin_over(here.score, [_rival_score(rival, here) for rival in rivals])
+    scores = [
+        as_rival(rival.score, (rival.agree, here.agree), (_violated(rival), _violated(here)))
+        for rival in rivals
+    ]
+    margin = margin_over(here.score, scores)
     least = max(MIN_AGREE, MIN_TOLD_SHARE * here.agree)
     return _Standing(
         margin=max(margin, -1.0),
         refutation=refutation([_violated(rival) for rival in rivals if rival.agree >= least]),
     )
-
-
-def _rival_score(rival: Merge, here: Merge) -> float:
-    """What another place of a scan scores, as ``rival_score`` has it of a pair.
-
-    A place that is contradicted no more counts as if the scan overlapped there as much as here.
-    """
-    bearable = max(CLEAN_SHARE, AS_CLEAN * _violated(here))
-    if rival.agree < MIN_RIVAL_SHARE * here.agree or _violated(rival) > bearable:
-        return rival.score
-    return rival.score * max(1.0, here.agree / rival.agree)
 
 
 def _violated(merge: Merge) -> float:

@@ -87,9 +87,7 @@ def decide(
     if len(ties) < 2:
         return None
     turns = _all_turns(ties, j.centre, refine, near, max_margin)
-    if len(turns) > MAX_TURNS:
-        return None
-    if len(turns) <= MIN_REFUTED:
+    if not MIN_REFUTED < len(turns) <= MAX_TURNS:
         return None
     seen = [see(i, j, option.i_from_j, diameter) for option in turns]
     told = [[told_of([one], tolerance) for one in both] for both in seen]
@@ -234,23 +232,21 @@ def _is_small(scan: ScanField, mark: BoolArray, diameter: float) -> bool:
     return float(np.quantile(away, MOST)) < MARK_DIAMETERS * diameter
 
 
-def pixels_against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
+def _against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
     """Pixels of patches that are contradicted in a rival and agreed with in a pose.
 
     They must be few enough, in each scan, to be a mark: else the poses differ all over.
     """
-    counts = _counts_against(rival, pose)
+    counts = [
+        int(np.count_nonzero(b.violates & a.agrees)) for b, a in zip(rival, pose, strict=True)
+    ]
     is_small = all(n <= one.max_pixels for n, one in zip(counts, pose, strict=True))
     return sum(counts) if is_small else 0
 
 
-def _counts_against(rival: Sequence[Told], pose: Sequence[Told]) -> list[int]:
-    return [int(np.count_nonzero(b.violates & a.agrees)) for b, a in zip(rival, pose, strict=True)]
-
-
 def is_refuted_jointly(rival: Sequence[Told], pose: Sequence[Told]) -> bool:
     """Whether patches of pixels of any scans speak for their poses and against rival ones."""
-    against = pixels_against(rival, pose)
+    against = _against(rival, pose)
     if against < MIN_MARK_PIXELS:
         return False
     return _reverse(rival, pose) <= MAX_REVERSE * against

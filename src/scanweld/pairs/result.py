@@ -110,17 +110,30 @@ class Alternative:
 
 
 def rival_score(rival: Alternative, best: Alternative) -> float:
-    """What a pose scores as a rival of another one of the same two scans.
+    """What a pose scores as a rival of another one of the same two scans; see ``as_rival``."""
+    said, told = rival.evidence, best.evidence
+    if said.agree < MIN_AGREE:
+        return rival.score
+    told_share = told.violation / max(told.agree, MIN_AGREE)
+    shares = said.violation / said.agree, told_share
+    return as_rival(rival.score, (said.agree, told.agree), shares)
+
+
+def as_rival(score: float, agree: tuple[float, float], violated: tuple[float, float]) -> float:
+    """What a place scores as a rival of the best one.
 
     A rival that is contradicted no more explains the scans as well, if they overlap less in it:
     on a symmetric object the next turn does. It counts as if it overlapped as much.
+
+    Args:
+        score: Of the rival by itself.
+        agree: What agrees, in the rival and in the best place.
+        violated: Violations as a share of that, likewise.
     """
-    said, told = rival.evidence, best.evidence
-    bearable = max(CLEAN_SHARE, AS_CLEAN * told.violation / max(told.agree, MIN_AGREE))
-    is_seen = said.agree >= max(MIN_AGREE, MIN_RIVAL_SHARE * told.agree)
-    if not is_seen or said.violation > bearable * said.agree:
-        return rival.score
-    return rival.score * max(1.0, told.agree / said.agree)
+    bearable = max(CLEAN_SHARE, AS_CLEAN * violated[1])
+    if agree[0] <= MIN_RIVAL_SHARE * agree[1] or violated[0] > bearable:
+        return score
+    return score * max(1.0, agree[1] / agree[0])
 
 
 def near_best(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
