@@ -21,6 +21,7 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, write_mesh_ply, write_poses
 from scanweld.io.ply_write import write_scan_ply
+from tests.command_line import error_line, scanweld
 from tests.results import a_result, stub_run, turned
 from tests.scenes import PRIMITIVES
 
@@ -47,22 +48,6 @@ def scans(scan_file: Path, tmp_path: Path) -> Path:
     for name in ("a", "b", "c"):
         shutil.copy(scan_file, folder / f"{name}.ply")
     return folder
-
-
-def scanweld(*arguments: str | Path) -> int:
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    assert isinstance(left.value.code, int)
-    return left.value.code
-
-
-def error_line(capsys: pytest.CaptureFixture[str]) -> str:
-    """The one line on stderr, after nothing on stdout."""
-    out, err = capsys.readouterr()
-    assert out == ""
-    (line,) = err.splitlines()
-    assert line.startswith("scanweld: error: ")
-    return line
 
 
 def fail_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:

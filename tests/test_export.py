@@ -10,7 +10,6 @@ import pytest
 from scipy.spatial import KDTree
 
 from scanweld.app import job
-from scanweld.app.cli import main
 from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.camera import CameraModel
@@ -28,6 +27,7 @@ from scanweld.io import (
 from scanweld.io.ply_body import decode_body
 from scanweld.io.ply_header import parse_header
 from scanweld.io.pose_formats import FORMATS, Frame, match_poses, read_any_poses
+from tests.command_line import error_line, scanweld
 from tests.results import stub_run
 from tests.scenes import Scene, primitive_scene, scene_of
 
@@ -60,21 +60,6 @@ def model(scene: Scene) -> Path:
     (folder / "report.json").write_text(json.dumps({"format": 1, "scans": files}))
     (folder / "config.toml").write_text("unit = 'mm'\n")
     return folder
-
-
-def scanweld(*arguments: str | Path) -> int:
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    assert isinstance(left.value.code, int)
-    return left.value.code
-
-
-def error_line(capsys: pytest.CaptureFixture[str]) -> str:
-    out, err = capsys.readouterr()
-    assert out == ""
-    (line,) = err.splitlines()
-    assert line.startswith("scanweld: error: ")
-    return line
 
 
 def snapshot() -> dict[str, bytes | None]:

@@ -18,7 +18,7 @@ from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
 from tests.prepared import creature_pair
-from tests.test_view_graph import (
+from tests.view_graphs import (
     CENTRE,
     WEAK,
     Pairs,

@@ -3,25 +3,20 @@
 import dataclasses
 import json
 import re
-from html.parser import HTMLParser
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scanweld.app import job
-from scanweld.app.cli import main
-from scanweld.app.html_report import numbers, write_html_report
+from scanweld.app.html_report import write_html_report
 from scanweld.app.html_report.buffers import box_around, packed, quantised, steps
-from scanweld.app.html_report.colors import scan_colors
 from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
-from scanweld.app.html_report.page import scan_looks
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
 from scanweld.app.html_report.sources import Sources
 from scanweld.app.html_report.surface_check import check_surface, open_borders, thin_share
-from scanweld.app.html_report.view_graph import draw_graph, pair_level, round_order
+from scanweld.app.html_report.view_graph import pair_level
 from scanweld.app.model_files import PairEntry
 from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
@@ -34,49 +29,11 @@ from scanweld.pairs.result import PairKind
 from scanweld.pairs.slippage import Slide
 from scanweld.prepare.support import find_support
 from scanweld.reconstruction import FactReport, FactVerdict, ScanVerdict
+from tests.command_line import scanweld as command
+from tests.html_pages import Page
 from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
 from tests.results import a_pair, a_result, no_pair
 from tests.test_support import on_table, seen
-
-VOID = {"meta", "link", "img", "br", "input", "hr", "col"}
-
-
-class Page(HTMLParser):
-    """Elements with their attributes and text; refuses tags that are not closed in order."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.elements: list[tuple[str, dict[str, str]]] = []
-        self.text: dict[str, str] = {}
-        self.words: list[str] = []
-        self._open: list[str] = []
-        self._id = ""
-        self.feed(text)
-        self.close()
-        assert not self._open
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        found = {key: value or "" for key, value in attrs}
-        self.elements.append((tag, found))
-        self._id = found.get("id", "")
-        if tag not in VOID:
-            self._open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, {key: value or "" for key, value in attrs}))
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self._open and self._open.pop() == tag, f"</{tag}> at {self.getpos()}"
-
-    def handle_data(self, data: str) -> None:
-        if self._id:
-            self.text[self._id] = self.text.get(self._id, "") + data
-        if self._open and self._open[-1] not in ("script", "style"):
-            self.words.append(data)
-
-    def values(self) -> set[str]:
-        """All exact numbers that stand beside those that are shown."""
-        return {found["data-value"] for _, found in self.elements if "data-value" in found}
 
 
 def page_of(folder: Path) -> Page:
@@ -398,77 +355,21 @@ def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixt
     read, _ = job.read_all(job.collect([scans]))
     result = good_result(dataclasses.replace(scene, scans=tuple(read)))
     folder = written(tmp_path / "model", result)
-    assert run("report", folder, "--scans", scans) == 0
+    assert command("report", folder, "--scans", scans) == 0
     assert capsys.readouterr().out.strip() == str(folder / "report.html")
     assert num_pictures(folder) == 8
-    assert run("report", folder) == 0  # where they are, this folder does not say
+    assert command("report", folder) == 0  # where they are, this folder does not say
     assert num_pictures(folder) == 3
     write_outputs(result, folder, {scan.name: f"../scans/{scan.name}.ply" for scan in read})
-    assert run("report", folder) == 0
+    assert command("report", folder) == 0
     assert num_pictures(folder) == 8
-    assert run("report", folder, "--scans", scans / f"{read[0].name}.ply") == 1
+    assert command("report", folder, "--scans", scans / f"{read[0].name}.ply") == 1
     assert "its file is not among the scans given" in capsys.readouterr().err
     (folder / "graph.json").unlink()
-    assert run("report", folder) == 1
+    assert command("report", folder) == 1
     assert capsys.readouterr().err.startswith("scanweld: error: ")
-    assert run("report", tmp_path / "none") == 1
+    assert command("report", tmp_path / "none") == 1
 
 
 def num_pictures(folder: Path) -> int:
     return len([tag for tag, _ in page_of(folder).elements if tag == "img"])
-
-
-def run(*arguments: str | Path) -> int:
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    assert isinstance(left.value.code, int)
-    return left.value.code
-
-
-def test_scans_of_one_side_stand_together():
-    names = [f"s{k}" for k in range(12)]
-    shuffled = [names[k] for k in (0, 7, 2, 9, 4, 11, 6, 1, 8, 3, 10, 5)]
-    ring = [
-        dataclasses.replace(a_pair(names[k], names[(k + 1) % 12]), score=0.6) for k in range(12)
-    ]
-    order = round_order(shuffled, ring)  # type: ignore[arg-type]  # has what is asked of a pair
-    gaps = {(int(b[1:]) - int(a[1:])) % 12 for a, b in pairwise(order)}
-    assert gaps in ({1}, {11})
-
-
-def test_labels_are_short_and_numbers_keep_their_zeros():
-    assert [look.label for look in scan_looks(["scan_1", "scan_2", "scan_10"]).values()] == [
-        "1",
-        "2",
-        "10",
-    ]
-    assert [look.label for look in scan_looks(["a_08", "a_09"]).values()] == ["08", "09"]
-    looks = scan_looks(["the first of all", "another one"])
-    assert [look.label for look in looks.values()] == ["1", "2"]
-    assert len(set(scan_colors(60))) == 60
-
-
-def test_the_drawing_has_every_scan_once():
-    drawing = draw_graph([["a", "b"]], ["c"], [])
-    assert sorted(node.name for node in drawing.nodes) == ["a", "b", "c"] and not drawing.links
-
-
-@pytest.mark.parametrize(
-    ("told", "wanted"),
-    [
-        (numbers.share(0.8625), "86\u00a0%"),
-        (numbers.share(None), "–"),
-        (numbers.score(float("nan")), "–"),
-        (numbers.length(0.0005489, None), "0.000549"),
-        (numbers.length(12.345, "mm"), "12.3\u00a0mm"),
-        (numbers.length(0.0000503, "m"), "0.0503\u00a0mm"),
-        (numbers.length(2.76, "m"), "2.76\u00a0m"),
-        (numbers.length(0.0, None), "0"),
-        (numbers.length(1.5e-7, None), "1.50·10⁻⁷"),
-        (numbers.of_diameter(0.5, 250.0), "0.20\u00a0%"),
-        (numbers.duration(61.04), "61.0\u00a0s"),
-        (numbers.duration(404.4), "6 min 44 s"),
-    ],
-)
-def test_numbers_as_people_read_them(told: str, wanted: str):
-    assert told == wanted

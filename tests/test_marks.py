@@ -22,7 +22,7 @@ from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.pairs.turning import STEP_DEG, turn_to_mark
 from tests.prepared import PreparedPair, prepared_pair
 from tests.scenes import scene_of
-from tests.test_view_graph import exact_pair, pair_of, seen, world_of
+from tests.view_graphs import exact_pair, pair_of, seen, world_of
 
 Radius = Callable[[FloatArray, FloatArray], FloatArray]
 TOLERANCE = 0.012

@@ -15,7 +15,6 @@ from scanweld.evaluation.surface_defects import surface_defects
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
 from scanweld.fusion.color import exposure_gains
-from scanweld.fusion.finish import close_pinholes, decimated, smoothed, split_fans
 from scanweld.fusion.noise import scan_noise
 from scanweld.fusion.posed_image import PosedImage, pose_image
 from scanweld.fusion.sheets import second_sheets, without_second_sheets
@@ -369,39 +368,3 @@ def test_properties_are_written(tmp_path: Path):
     np.testing.assert_array_equal(found.support, mesh.support)
     np.testing.assert_array_equal(found.filled, mesh.filled)
     np.testing.assert_allclose(found.stdev, mesh.stdev, rtol=1e-6)
-
-
-def test_sheets_that_touch_come_apart():
-    """Two tetrahedra that share an edge, and two that share a vertex."""
-    tetra = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    by_edge = np.concatenate([tetra, [[0, 1, 4], [0, 5, 1], [1, 5, 4], [4, 5, 0]]])
-    by_vertex = np.concatenate([tetra, [[0, 5, 4], [0, 4, 6], [4, 5, 6], [5, 0, 6]]])
-    for faces, num_vertices in ((by_edge, 8), (by_vertex, 8)):
-        apart, parts = split_fans(faces)
-        assert len(parts) == num_vertices
-        np.testing.assert_array_equal(parts[apart], faces)
-        edges = np.sort(apart[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
-    back_to_back = np.concatenate([tetra, [[7, 8, 9], [7, 9, 8]]])
-    assert len(split_fans(back_to_back)[0]) == len(tetra)
-
-
-def test_only_small_holes_are_pinholes():
-    body = sphere(1.0)
-    faces = body.faces[~np.isin(body.faces, [100]).any(axis=1)]
-    faces = faces[~(body.vertices[faces][:, :, 2] > 0.8).any(axis=1)]
-    flags = np.zeros(len(body.vertices), dtype=bool)
-    vertices, closed, _ = close_pinholes(body.vertices, faces, flags, 0.5)
-    start, _ = border_edges(closed, len(vertices))
-    assert len(vertices) == len(body.vertices) + 1
-    assert (vertices[start, 2] > 0.7).all()
-    outward = np.einsum("fk,fk->f", face_normals(vertices, closed), vertices[closed[:, 0]])
-    assert outward.min() > 0
-
-
-def test_decimation_of_few_faces_changes_nothing():
-    body = sphere(1.0)
-    flags = np.zeros(len(body.vertices), dtype=bool)
-    vertices, faces, _ = decimated(body.vertices, body.faces, flags, len(body.faces))
-    assert vertices is body.vertices and faces is body.faces
-    assert smoothed(body.vertices, body.faces, 0) is body.vertices

@@ -1,95 +1,36 @@
 """Preparing scans: what the sensor saw and did not see, normals, samples, rims, odd scans."""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
-import trimesh
 from scipy.spatial import KDTree
 
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
-from scanweld.evaluation.primitives import box, sphere
+from scanweld.evaluation.primitives import box
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import view_of
-from scanweld.geometry.arrays import BoolArray, FloatArray
-from scanweld.geometry.camera import Camera, CameraModel
-from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.camera import CameraModel
+from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.prepare import prepare
 from scanweld.prepare.sampling import farthest_points
-from scanweld.prepare.silhouette import classify_pixels, close
+from tests.depth_scans import (
+    CONFIG,
+    MODELS,
+    RADIUS,
+    angles_deg,
+    ball,
+    bumps,
+    kind_at,
+    scan_of_depth,
+)
 from tests.prepared import creature_pair, moved, scaled
 from tests.scenes import pair_at_gap, random_motion
-
-CONFIG = PrepareConfig()
-MODELS = (CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC)
-RADIUS = 50.0
-
-
-@lru_cache
-def ball(model: CameraModel) -> tuple[PreparedScan, FloatArray]:
-    """A ball, prepared, and its centre (3,) in the sensor frame."""
-    mesh = sphere(RADIUS)
-    view = view_of(mesh, 40, 20, 70, pixels=120, model=model)
-    motion = random_motion(np.random.default_rng(4), 200.0)
-    scan = scan_mesh(mesh, view.camera, view.world_from_sensor, scan_from_sensor=motion)
-    return prepare(scan, CONFIG), view.world_from_sensor.inverse().translation
-
-
-def ortho(width: int, height: int) -> Camera:
-    """One unit a pixel."""
-    return Camera(
-        model=CameraModel.ORTHOGRAPHIC, width=width, height=height, fx=1, fy=1, cx=0, cy=0
-    )
-
-
-def scan_of_depth(depth: FloatArray, camera: Camera | None = None) -> RangeScan:
-    """A scan of a depth image (H, W), NaN where nothing was seen, in the sensor's frame."""
-    camera = camera or ortho(depth.shape[1], depth.shape[0])
-    has = np.isfinite(depth)
-    grid = np.full(depth.shape, -1)
-    grid[has] = np.arange(has.sum())
-    return RangeScan(
-        name="drawn",
-        points=camera.unproject_image(depth)[has],
-        grid=grid,
-        camera=camera,
-        scan_from_sensor=Pose.identity(),
-        viewpoint=Viewpoint.GIVEN,
-    )
-
-
-def bumps(rows: int = 90, columns: int = 90, margin: int = 15) -> FloatArray:
-    """Depth of a wavy patch in the middle of the image, nothing around it."""
-    v, u = np.mgrid[:rows, :columns]
-    depth = 200 + 4 * np.sin(u / 9) + 5 * np.cos(v / 11)
-    inside = (np.minimum(u, columns - 1 - u) >= margin) & (np.minimum(v, rows - 1 - v) >= margin)
-    return np.where(inside, depth, np.nan)
-
-
-def xy_of(scan: PreparedScan) -> tuple[FloatArray, FloatArray]:
-    """Coordinates (H, W) of the image's pixels in the plane of an orthographic scan."""
-    ones = scan.image.camera.unproject_image(np.ones(scan.image.depth.shape))
-    return ones[..., 0], ones[..., 1]
-
-
-def kind_at(scan: PreparedScan, x: float, y: float) -> PixelKind:
-    """Kind of the pixel at (x, y) of an orthographic scan."""
-    camera = scan.image.camera
-    column, row = round(camera.fx * x + camera.cx), round(camera.fy * y + camera.cy)
-    return PixelKind(scan.image.kind[row, column])
-
-
-def angles_deg(a: FloatArray, b: FloatArray) -> FloatArray:
-    sine = np.linalg.norm(np.cross(a, b), axis=-1)
-    return np.degrees(np.arctan2(sine, (a * b).sum(axis=-1)))
-
-
-# What the sensor saw
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -143,128 +84,6 @@ def test_the_mesh_is_the_image():
 
 
 # Free and unknown
-
-
-def ring() -> PreparedScan:
-    """A flat ring, radii 20 and 50, from above."""
-    made = trimesh.creation.annulus(r_min=20, r_max=50, height=10, sections=128)
-    mesh = TriangleMesh(vertices=np.asarray(made.vertices), faces=np.asarray(made.faces))
-    view = view_of(mesh, 0, 90, pixels=120, model=CameraModel.ORTHOGRAPHIC)
-    return prepare(scan_mesh(mesh, view.camera, view.world_from_sensor), CONFIG)
-
-
-def test_an_enclosed_hole_is_unknown_and_the_outside_is_free():
-    scan = ring()
-    x, y = xy_of(scan)
-    radius, kind = np.hypot(x, y), scan.image.kind
-    slack = 1.5 * scan.image.pixel
-    assert (kind[radius < 20 - slack] == PixelKind.UNKNOWN).all()
-    assert (kind[(radius > 20 + slack) & (radius < 50 - slack)] == PixelKind.SURFACE).all()
-    assert scan.scan.camera is not None
-    reach = 0.5 * scan.scan.camera.width / scan.scan.camera.fx
-    in_view = np.maximum(np.abs(x), np.abs(y)) < reach - scan.image.pixel
-    assert (kind[in_view & (radius > 50 + slack)] == PixelKind.FREE).all()
-    assert (kind[np.maximum(np.abs(x), np.abs(y)) > reach] == PixelKind.UNKNOWN).all()
-
-
-def test_free_pixels_know_how_far_outside_they_are():
-    scan = ring()
-    x, y = xy_of(scan)
-    is_free = scan.image.kind == PixelKind.FREE
-    expected = np.hypot(x, y)[is_free] - 50
-    np.testing.assert_allclose(scan.image.outside[is_free], expected, atol=1.5 * scan.image.pixel)
-    assert (scan.image.outside[~is_free] == 0).all()
-
-
-def test_the_image_has_free_space_all_around():
-    """The border of the image is as wide as the closing: no surface touches it."""
-    for model in MODELS:
-        kind = ball(model)[0].image.kind
-        border = np.concatenate([kind[0], kind[-1], kind[:, 0], kind[:, -1]])
-        assert set(border) <= {PixelKind.FREE, PixelKind.UNKNOWN}
-
-
-def test_beyond_the_field_of_view_nothing_is_known():
-    """The right half of the patch is outside the image: there is no free space to the right."""
-    depth = bumps()
-    whole, cut = (
-        prepare(scan_of_depth(depth), CONFIG),
-        prepare(scan_of_depth(depth[:, :45]), CONFIG),
-    )
-    for x in (46.0, 48.0):
-        assert kind_at(whole, x, 45) is PixelKind.SURFACE
-        assert kind_at(cut, x, 45) is PixelKind.UNKNOWN
-    x, _ = xy_of(cut)
-    assert (cut.image.kind[x > 45] == PixelKind.UNKNOWN).all()
-    for scan in (whole, cut):
-        assert kind_at(scan, 11, 45) is PixelKind.FREE
-        assert kind_at(scan, 30, 11) is PixelKind.FREE
-
-
-def test_a_gap_that_the_field_of_view_cuts_off_is_unknown():
-    """A horseshoe, open to the right, where the image ends: its inside may be a hole."""
-    depth = bumps()
-    depth[30:60, 30:] = np.nan
-    whole, cut = (
-        prepare(scan_of_depth(depth), CONFIG),
-        prepare(scan_of_depth(depth[:, :70]), CONFIG),
-    )
-    assert kind_at(whole, 60, 45) is PixelKind.FREE
-    assert kind_at(cut, 60, 45) is PixelKind.UNKNOWN
-    assert kind_at(cut, 40, 11) is PixelKind.FREE
-
-
-def test_without_a_camera_the_field_of_view_is_not_held_against_the_scan():
-    scan = scan_of_depth(bumps()[:, :45])
-    blind = replace(scan, camera=None, grid=None)
-    prepared = prepare(blind, CONFIG)
-    assert prepared.image.camera.model is CameraModel.ORTHOGRAPHIC
-    assert (prepared.image.kind == PixelKind.FREE).any()
-
-
-def test_lost_returns_are_filled_or_unknown_never_free():
-    depth = bumps()
-    rng = np.random.default_rng(8)
-    depth[rng.random(depth.shape) < 0.1] = np.nan
-    depth[40:52, 40:52] = np.nan
-    scan = prepare(scan_of_depth(depth), CONFIG)
-    x, y = xy_of(scan)
-    inside = (np.abs(x - 44.5) < 28) & (np.abs(y - 44.5) < 28)
-    kind = scan.image.kind
-    assert (kind[inside] != PixelKind.FREE).all()
-    assert kind_at(scan, 46, 46) is PixelKind.UNKNOWN
-    lost = np.isnan(depth[17:38, 17:38]).mean()
-    patch = (np.abs(x - 27) < 10) & (np.abs(y - 27) < 10)
-    assert (kind[patch] != PixelKind.SURFACE).mean() < 0.2 * lost
-
-
-def notched(width: int) -> BoolArray:
-    mask = np.zeros((80, 80), dtype=bool)
-    mask[20:60, 20:60] = True
-    mask[20:45, 40 - width // 2 : 40 + width // 2] = False
-    return mask
-
-
-def test_a_narrow_notch_is_unknown_a_wide_one_free():
-    """A gap narrower than twice the closing radius may as well be a shadow."""
-    everywhere = np.ones((80, 80), dtype=bool)
-    narrow, _ = classify_pixels(notched(6), everywhere, 5.0)
-    wide, outside = classify_pixels(notched(24), everywhere, 5.0)
-    assert narrow[25, 40] == PixelKind.UNKNOWN
-    assert wide[25, 40] == PixelKind.FREE
-    assert outside[25, 40] == pytest.approx(12, abs=1.5)
-
-
-def test_closing_changes_nothing_convex_and_shrinks_nothing():
-    v, u = np.mgrid[:60, :60]
-    disc = np.hypot(u - 30, v - 30) <= 15
-    np.testing.assert_array_equal(close(disc, 6.0), disc)
-    comb = notched(4)
-    assert (close(comb, 4.0) >= comb).all() and close(comb, 4.0)[30, 40]
-    np.testing.assert_array_equal(close(comb, 0.0), comb)
-
-
-# Jumps, rims, pieces
 
 
 def step(height: float) -> PreparedScan:

@@ -10,7 +10,6 @@ import pytest
 from rich.console import Console
 
 import scanweld
-from scanweld.app.cli import main
 from scanweld.app.json_lines import EVENTS, event_line
 from scanweld.app.progress import Drawing, bars_on
 from scanweld.config import Config
@@ -19,6 +18,7 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import write_scan_ply
 from scanweld.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+from tests.command_line import scanweld as command
 from tests.scenes import creature_scene, scene_of
 
 ESCAPE = "\x1b"
@@ -98,17 +98,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def leave(*arguments: str | Path) -> int:
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    assert isinstance(left.value.code, int)
-    return left.value.code
-
-
 def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ):
-    code = leave("run", folder, "-o", "model", "--json")
+    code = command("run", folder, "-o", "model", "--json")
     out, err = capsys.readouterr()
     lines: Told = [json.loads(line) for line in out.splitlines()]
     assert err == "" and lines[0] == {"event": "stage_started", "stage": "read"}
@@ -124,7 +117,7 @@ def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     assert "broken.ply" in str(told["reason"])
     assert lines.index(told) < lines.index({"event": "stage_started", "stage": "prepare"})
     # The poses that were found, fused: the same words.
-    assert leave("fuse", folder, "--poses", "model/poses.json", "-o", "fused", "--json") == 3
+    assert command("fuse", folder, "--poses", "model/poses.json", "-o", "fused", "--json") == 3
     again = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert again[-1]["event"] == "finished" and again[-1]["verdict"] == "partial"
     assert "broken" in {line.get("scan") for line in again}
@@ -136,7 +129,7 @@ def test_an_error_is_a_line_on_stderr_and_no_verdict(
     (tmp_path / "scans").mkdir()
     for name in "ab":
         (tmp_path / "scans" / f"{name}.ply").write_text("not a scan")
-    assert leave("run", tmp_path / "scans", "-o", tmp_path / "model", "--json") == 1
+    assert command("run", tmp_path / "scans", "-o", tmp_path / "model", "--json") == 1
     out, err = capsys.readouterr()
     events = [json.loads(line)["event"] for line in out.splitlines()]
     assert "finished" not in events and events.count("scan_refused") == 2
@@ -144,13 +137,13 @@ def test_an_error_is_a_line_on_stderr_and_no_verdict(
 
 
 def test_without_a_terminal_there_are_plain_lines(folder: Path, capsys: pytest.CaptureFixture[str]):
-    assert leave("run", folder, "-o", "model") == 3
+    assert command("run", folder, "-o", "model") == 3
     out, err = capsys.readouterr()
     lines = err.splitlines()
     assert ESCAPE not in out + err and all(line.startswith("scanweld: ") for line in lines)
     assert [line for line in lines if "refused broken" in line] == lines[:1]
     assert any(line.startswith("scanweld: pairs: pairs 3 (") for line in lines)
-    assert leave("run", folder, "-o", "quiet", "-q") == 3
+    assert command("run", folder, "-o", "quiet", "-q") == 3
     assert capsys.readouterr().err == ""
 
 
