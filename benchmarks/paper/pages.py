@@ -10,7 +10,9 @@ _INDEX = """# The paper, reproduced and surpassed
 
 The tables and figures of the published method (PA-HKS and MM-ICC) beside those of the default
 method and of other tools; `make paper` measures them all again. Each page prints the command that
-wrote it, and the records behind it lie in `data/` as JSON.
+wrote it, and the records behind it lie in `data/` as JSON. They name
+the code that was measured by a digest: until `make paper` has run again, the figures of the
+default method are of that code, not of a later one.
 
 """
 
