@@ -15,10 +15,11 @@ from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.multiview.explain import find_doubts
 from scanweld.multiview.merge import Poses, propose_merges
 from scanweld.multiview.view_graph import Component, ViewGraph
-from scanweld.pairs.marks import Decided, decide, is_refuted_jointly
-from scanweld.pairs.pixels import Told, see, told_of
+from scanweld.pairs.marks import Decided, decide
+from scanweld.pairs.pixels import see
 from scanweld.pairs.register import alternative_at
 from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.told import Told, is_refuted_jointly, told_of
 from scanweld.pairs.turning import STEP_DEG, turn_to_mark
 from tests.prepared import PreparedPair, prepared_pair
 from tests.scenes import scene_of

@@ -24,8 +24,9 @@ from scanweld.multiview.scale import estimate_scales
 from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.field import ScanField, make_field
-from scanweld.pairs.pixels import Told, see, told_of
+from scanweld.pairs.pixels import see
 from scanweld.pairs.result import Evidence, PairResult
+from scanweld.pairs.told import Told, told_of
 from scanweld.pairs.visibility import judge, mean_evidence
 from scanweld.progress import ScanRefused
 from scanweld.reconstruction import FactReport

@@ -7,7 +7,6 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.marks import Told, is_refuted_jointly
 from scanweld.pairs.result import (
     VIOLATION_WEIGHT,
     Evidence,
@@ -15,6 +14,7 @@ from scanweld.pairs.result import (
     PairResult,
     margin_over,
 )
+from scanweld.pairs.told import Told, is_looked_past, is_refuted_jointly
 
 Judge = Callable[[int, int, Pose], Evidence]
 """Mean evidence of both directions on scans i and j at a pose ``i_from_j`` of their sensors."""
@@ -145,11 +145,14 @@ def _unrefuted(a: Poses, b: Poses, merges: Sequence[Merge], tell: Tell) -> list[
     if len(tied) < 2:
         return list(merges)
     told = [tell(a, {j: merge.a_from_b @ pose for j, pose in b.items()}) for merge in tied]
-    refuted = [
-        merge
-        for merge, own in zip(tied, told, strict=True)
-        if any(other is not own and is_refuted_jointly(own, other) for other in told)
-    ]
+    left = list(zip(tied, told, strict=True))
+    for refutes in (is_refuted_jointly, is_looked_past):
+        left = [
+            (merge, own)
+            for merge, own in left
+            if not any(refutes(own, other) for _, other in left if other is not own)
+        ]
+    refuted = [merge for merge in tied if not any(merge is one for one, _ in left)]
     return [merge for merge in merges if not any(merge is one for one in refuted)]
 
 

@@ -21,14 +21,20 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import RASTER_DEPTH, ScanField
-from scanweld.pairs.pixels import Told, TwoWay, agrees, coherent, fallen_on, see, told_of
+from scanweld.pairs.pixels import TwoWay, fallen_on, see
 from scanweld.pairs.result import CLEAN_SHARE, Alternative, rival_score
+from scanweld.pairs.told import (
+    MAX_REVERSE,
+    MIN_MARK_PIXELS,
+    Told,
+    agrees,
+    coherent,
+    is_refuted_jointly,
+    reverse,
+    told_of,
+)
 from scanweld.pairs.visibility import pose_rows
 
-MIN_MARK_PIXELS = 10
-"""Pixels in such patches that refute a pose, or make a mark, at least."""
-MAX_REVERSE = 0.1
-"""Share of them that may speak against the other pose; share of a mark that a rival may show."""
 MIN_SAYING = 0.25
 """Share of the refuted poses that a mark's place refutes."""
 MARK_DIAMETERS = 0.15
@@ -117,7 +123,7 @@ def _is_worse(rival: TwoWay, pose: Sequence[Told], tolerance: float) -> bool:
     """Whether patches of any size, wherever they are, contradict a rival and none the pose."""
     told = [told_of([one], tolerance) for one in rival]
     against = sum(int(np.count_nonzero(one.violates)) for one in told)
-    return against >= MIN_MARK_PIXELS and _reverse(told, pose) <= MAX_REVERSE * against
+    return against >= MIN_MARK_PIXELS and reverse(told, pose) <= MAX_REVERSE * against
 
 
 def _is_mark(
@@ -230,30 +236,3 @@ def _is_small(scan: ScanField, mark: BoolArray, diameter: float) -> bool:
     points = np.stack([x, y, depth], axis=1)
     away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     return float(np.quantile(away, MOST)) < MARK_DIAMETERS * diameter
-
-
-def _against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
-    """Pixels of patches that are contradicted in a rival and agreed with in a pose.
-
-    They must be few enough, in each scan, to be a mark: else the poses differ all over.
-    """
-    counts = [
-        int(np.count_nonzero(b.violates & a.agrees)) for b, a in zip(rival, pose, strict=True)
-    ]
-    is_small = all(n <= one.max_pixels for n, one in zip(counts, pose, strict=True))
-    return sum(counts) if is_small else 0
-
-
-def is_refuted_jointly(rival: Sequence[Told], pose: Sequence[Told]) -> bool:
-    """Whether patches of pixels of any scans speak for their poses and against rival ones."""
-    against = _against(rival, pose)
-    if against < MIN_MARK_PIXELS:
-        return False
-    return _reverse(rival, pose) <= MAX_REVERSE * against
-
-
-def _reverse(rival: Sequence[Told], pose: Sequence[Told]) -> int:
-    """Pixels of patches that are contradicted in a pose and not in its rival."""
-    return sum(
-        int(np.count_nonzero(a.violates & ~b.violates)) for b, a in zip(rival, pose, strict=True)
-    )

@@ -13,8 +13,9 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.information import information_from, two_way_matches
-from scanweld.pairs.pixels import TwoWay, agrees, coherent, fallen_on, see, told_of
+from scanweld.pairs.pixels import TwoWay, fallen_on, see
 from scanweld.pairs.slippage import Slide, slippage_of
+from scanweld.pairs.told import agrees, coherent, told_of
 
 FIRST_STEP_DEG, STEP_DEG, FINE_STEP_DEG = 15.0, 3.0, 0.5
 """Between turns that show whether there is a mark at all, that find it, and that fit it."""

@@ -1,0 +1,121 @@
+"""Where a sensor looked past the object: a notch in its outline tells turns apart."""
+
+import numpy as np
+import pytest
+
+from scanweld.evaluation.primitives import lathe
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose, rotation_exp
+from scanweld.multiview.merge import Poses, propose_merges
+from scanweld.pairs.field import ScanField
+from scanweld.pairs.pixels import PAST_PIXELS, see
+from scanweld.pairs.result import Alternative, PairKind
+from scanweld.pairs.told import Told, is_looked_past, told_of
+from tests.prepared import PreparedPair, creature_pair, prepared_pair
+from tests.scenes import scene_of
+from tests.view_graphs import pair_of, seen
+
+TOLERANCE = 0.012
+TURNS = (45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0)
+
+
+def gear(turn: FloatArray, level: FloatArray) -> FloatArray:
+    return 44.0 + 6.0 * np.tanh(4.0 * np.cos(8 * turn)) + 0.0 * level
+
+
+def toothless(turn: FloatArray, level: FloatArray) -> FloatArray:
+    """The gear with its tooth at 0 gone from top to bottom."""
+    is_gone = np.abs(np.angle(np.exp(1j * turn))) < np.pi / 10
+    return np.where(is_gone, 38.0, gear(turn, level))
+
+
+def from_both_sides(of_toothless: bool, noise: float) -> PreparedPair:
+    """A scan from the tooth's side, and one from behind that sees it only in its outline."""
+    mesh = lathe(toothless if of_toothless else gear, 30.0)
+    views = [view_of(mesh, turn, 35.0, 20.0, pixels=200.0) for turn in (0.0, 180.0)]
+    scene = scene_of(mesh, views, noise=NoiseModel(depth_diameters=noise, grazing_dropout=0.5))
+    return prepared_pair(scene.scans[0], scene.scans[1], scene.i_from_j(0, 1))
+
+
+def turned(pair: PreparedPair, degrees: float) -> Pose:
+    """The true pose with j's object turned about its axis, that of the motion between the views."""
+    motion = pair.i_from_j
+    angles, vectors = np.linalg.eig(motion.rotation)
+    axis = np.real(vectors[:, int(np.argmin(np.abs(angles - 1.0)))])
+    point = np.linalg.lstsq(np.eye(3) - motion.rotation, motion.translation, rcond=1e-6)[0]
+    turn = rotation_exp(np.radians(degrees) * axis)
+    return motion @ Pose(rotation=turn, translation=point - turn @ point)
+
+
+def told(pair: PreparedPair, i_from_j: Pose) -> list[Told]:
+    both = see(*pair.fields, i_from_j, pair.diameter)
+    return [told_of([one], TOLERANCE * pair.diameter) for one in both]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.001])
+def test_turns_that_fill_a_notch_in_the_outline_are_refuted(noise: float):
+    pair = from_both_sides(of_toothless=True, noise=noise)
+    right = told(pair, pair.i_from_j)
+    for degrees in TURNS:
+        wrong = told(pair, turned(pair, degrees))
+        assert is_looked_past(wrong, right)
+        assert not is_looked_past(right, wrong)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.001])
+def test_no_turn_of_a_whole_gear_is_refuted(noise: float):
+    pair = from_both_sides(of_toothless=False, noise=noise)
+    every = [told(pair, turned(pair, degrees)) for degrees in (0.0, *TURNS)]
+    assert not any(is_looked_past(a, b) for a in every for b in every)
+
+
+def past(scan: ScanField, moved: Pose) -> int:
+    """Pixels of a scan that is moved in its own sensor's frame where that sensor looked past."""
+    back, _ = see(scan, scan, moved.inverse(), 1.0)
+    return int(back.past.sum())
+
+
+def sideways(scan: ScanField, pixels: float) -> Pose:
+    shift = pixels * scan.centre[2] / scan.camera[1]
+    return Pose(rotation=np.eye(3), translation=np.array([shift, 0.0, 0.0]))
+
+
+def test_an_outline_a_pixel_off_is_not_looked_past():
+    scan = creature_pair(40.0).fields[0]
+    assert past(scan, Pose.identity()) == 0
+    far = past(scan, sideways(scan, 12.0))
+    assert far > 300
+    assert past(scan, sideways(scan, PAST_PIXELS)) < 0.02 * far
+
+
+def test_what_a_sensor_sees_the_back_of_is_not_looked_past():
+    pair = creature_pair(40.0)
+    scan, (x, _, z) = pair.fields[0], pair.fields[0].centre
+    shift = sideways(scan, 12.0)
+    about = rotation_exp(np.array([0.0, np.pi, 0.0]))
+    turn = Pose(rotation=about, translation=np.array([2 * x, 0.0, 2 * z]))
+    assert past(scan, shift @ turn) < 0.1 * past(scan, shift)
+
+
+def test_merges_that_sensors_look_past_are_no_rivals():
+    pair = from_both_sides(of_toothless=True, noise=0.0)
+    poses = [pair.i_from_j, *(turned(pair, degrees) for degrees in TURNS)]
+    options = [Alternative(i_from_j=pose, evidence=seen(0.5)) for pose in poses]
+    pairs = {(0, 1): pair_of(0, 1, PairKind.AMBIGUOUS, *options)}
+    centres = [field.centre for field in pair.fields]
+
+    def tell(_: Poses, moved: Poses) -> list[Told]:
+        return told(pair, moved[1])
+
+    (kept,) = propose_merges(
+        {0: Pose.identity()},
+        {1: Pose.identity()},
+        pairs,
+        centres,
+        (5.0, 0.03 * pair.diameter),
+        lambda i, j, pose: seen(0.5),
+        tell,
+    )
+    assert pair.off_by(kept.a_from_b)[0] < 1e-6 and kept.margin == 1.0
