@@ -1,5 +1,7 @@
 """Where a sensor looked past the object: a notch in its outline tells turns apart."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -8,11 +10,11 @@ from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.multiview.merge import Poses, propose_merges
+from scanweld.multiview.merge import propose_merges
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.pixels import PAST_PIXELS, see
 from scanweld.pairs.result import Alternative, PairKind
-from scanweld.pairs.told import Told, is_looked_past, told_of
+from scanweld.pairs.told import MIN_PAST_PIXELS, Told, is_looked_past, told_of
 from tests.prepared import PreparedPair, creature_pair, prepared_pair
 from tests.scenes import scene_of
 from tests.view_graphs import pair_of, seen
@@ -99,23 +101,58 @@ def test_what_a_sensor_sees_the_back_of_is_not_looked_past():
     assert past(scan, shift @ turn) < 0.1 * past(scan, shift)
 
 
-def test_merges_that_sensors_look_past_are_no_rivals():
-    pair = from_both_sides(of_toothless=True, noise=0.0)
-    poses = [pair.i_from_j, *(turned(pair, degrees) for degrees in TURNS)]
+def merges_of(told_by_turn: Sequence[list[Told]]) -> list[int]:
+    """Which of equally scored turns of one scan about another are left, given what pixels say."""
+    poses = [
+        Pose(rotation=rotation_exp(np.array([0.0, 0.0, 0.5 * n])), translation=np.zeros(3))
+        for n in range(len(told_by_turn))
+    ]
     options = [Alternative(i_from_j=pose, evidence=seen(0.5)) for pose in poses]
-    pairs = {(0, 1): pair_of(0, 1, PairKind.AMBIGUOUS, *options)}
-    centres = [field.centre for field in pair.fields]
 
-    def tell(_: Poses, moved: Poses) -> list[Told]:
-        return told(pair, moved[1])
+    def turn_of(pose: Pose) -> int:
+        return int(np.argmin([(pose.inverse() @ one).angle_deg() for one in poses]))
 
-    (kept,) = propose_merges(
+    merges = propose_merges(
         {0: Pose.identity()},
         {1: Pose.identity()},
-        pairs,
-        centres,
-        (5.0, 0.03 * pair.diameter),
+        {(0, 1): pair_of(0, 1, PairKind.AMBIGUOUS, *options)},
+        [np.zeros(3)] * 2,
+        (5.0, 0.03),
         lambda i, j, pose: seen(0.5),
-        tell,
+        lambda a, b: told_by_turn[turn_of(b[1])],
     )
-    assert pair.off_by(kept.a_from_b)[0] < 1e-6 and kept.margin == 1.0
+    return sorted(turn_of(merge.a_from_b) for merge in merges)
+
+
+def test_merges_that_sensors_look_past_are_no_rivals():
+    pair = from_both_sides(of_toothless=True, noise=0.0)
+    every = [told(pair, turned(pair, degrees)) for degrees in (0.0, *TURNS)]
+    assert merges_of(every) == [0]
+
+
+def says(*, violates: int = 0, past: range = range(0)) -> list[Told]:
+    """A scan of 400 pixels, of which the first are contradicted, and some looked past."""
+    at = np.arange(400).reshape(20, 20)
+    return [
+        Told(
+            agrees=at >= violates, violates=at < violates, past=np.isin(at, past), max_pixels=200.0
+        )
+    ]
+
+
+def test_outlines_speak_only_where_surfaces_have_shown_a_mark():
+    """What is missing from a scan of a symmetric object makes a notch in its outline as well."""
+    holed, whole, worn = says(past=range(100)), says(), says(violates=40)
+    assert merges_of([holed, whole, whole]) == [0, 1, 2]
+    assert merges_of([holed, whole, worn, worn]) == [0, 1]
+    assert merges_of([holed, whole, worn, worn, worn]) == [1]
+
+
+def test_an_outline_decides_only_by_far():
+    marked = [says(violates=40)] * 3
+    least = MIN_PAST_PIXELS
+    assert merges_of([says(past=range(least - 1)), says(), *marked]) == [0, 1]
+    assert merges_of([says(past=range(least)), says(), *marked]) == [1]
+    much = says(past=range(100))
+    assert merges_of([much, says(past=range(200, 240)), *marked]) == [0, 1]
+    assert merges_of([much, says(past=range(200, 220)), *marked]) == [1]

@@ -12,7 +12,7 @@ from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.multiview.explain import find_doubts
+from scanweld.multiview.explain import doubt_alone, find_doubts
 from scanweld.multiview.merge import Poses, propose_merges
 from scanweld.multiview.view_graph import Component, ViewGraph
 from scanweld.pairs.marks import Decided, decide
@@ -218,3 +218,17 @@ def test_what_only_a_mark_holds_is_doubtful():
     assert doubts(pairs[2, 3]) == {}
     assert list(doubts(marked)) == [3]
     assert "mark" in doubts(marked)[3]
+
+
+def test_no_scan_is_good_alone():
+    world = world_of(5)
+    three, two = (
+        Component(poses={k: world[k] for k in scans}, reference=scans[0])
+        for scans in ((0, 1, 2), (3, 4))
+    )
+    graph = ViewGraph(
+        pairs={}, accepted={}, rejected={}, components=(three, two), unplaced={}, doubts={0: "far"}
+    )
+    assert doubt_alone(graph) == {}
+    assert list(doubt_alone(replace(graph, doubts={0: "far", 2: "far", 4: "far"}))) == [1, 3]
+    assert doubt_alone(replace(graph, doubts=dict.fromkeys(range(5), "far"))) == {}

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks import trust as command
+from benchmarks.calibration.collect import NUM_SETS, Sets
+from benchmarks.calibration.scenes import OTHER
 from benchmarks.judging import floors as floors_module
 from benchmarks.judging import rivals, trial
 from benchmarks.judging.floors import Floor, floors, names_factor, real_sets
@@ -21,13 +23,15 @@ from benchmarks.judging.measures import (
     risk_coverage,
 )
 from benchmarks.judging.page import Results, page_text
-from benchmarks.judging.table import Runs, outcomes_of
+from benchmarks.judging.rivals import Rivals
+from benchmarks.judging.table import FIRST_SEED, Runs, outcomes_of
 from benchmarks.judging.tables import floor_table, kind_table, misses, scenario_table
 from benchmarks.judging.trial import Outcome, PairOutcome, ScanOutcome, judge, try_out
 from benchmarks.paper.study import Record, Study
 from benchmarks.sets import SETS
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Scene, make_scene
+from benchmarks.virtual.strangers import LIKE
 from scanweld.errors import InputError
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import PairKind
@@ -242,7 +246,9 @@ def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.Mo
         if len(made) == 3:
             raise Interrupted
         made.append(seed)
-        return replace(with_confidence(true, 0.9 - 0.01 * seed), scenario=scenario, seed=seed)
+        return replace(
+            with_confidence(true, 0.9 - 0.01 * (seed - FIRST_SEED)), scenario=scenario, seed=seed
+        )
 
     monkeypatch.setattr("benchmarks.judging.table.try_out", stub)
     study = Study(out=tmp_path, work=tmp_path / "w", workers=1, quick=False, command="test")
@@ -251,7 +257,7 @@ def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.Mo
         study.records(runs, lambda done, total: None)
     made[:] = [*made[:1]]
     records = study.records(runs, lambda done, total: None)
-    assert made[1:] == [3, 4]
+    assert made[1:] == [FIRST_SEED + 3, FIRST_SEED + 4]
     again = study.records(runs, lambda done, total: None)
     tables = [
         scenario_table(outcomes_of(r)) + floor_table(floors(outcomes_of(r)))
@@ -381,6 +387,15 @@ def test_scans_of_a_record_are_told_by_their_fields():
 
 def test_units_are_those_asked_for():
     units = Runs(scenarios=("ring of 6", "hand"), seeds=2).units(False)
-    assert units == [{"scenario": n, "seed": k} for n in ("ring of 6", "hand") for k in (0, 1)]
+    seeds = (FIRST_SEED, FIRST_SEED + 1)
+    assert units == [{"scenario": n, "seed": k} for n in ("ring of 6", "hand") for k in seeds]
     every: list[Mapping[str, Any]] = list(Runs().units(False))
     assert len(every) == sum(scenario.seeds for scenario in SCENARIOS.values())
+
+
+def test_calibration_and_trust_have_no_seed_in_common():
+    learned = {unit["seed"] for unit in Sets().units(False)}
+    others = {seed + OTHER for seed in learned}
+    asked = {unit["seed"] for unit in [*Runs().units(False), *Rivals().units(False)]}
+    assert len(learned) == NUM_SETS and not asked & (learned | others)
+    assert not {seed + LIKE for seed in asked} & (learned | others)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.judging.measures import risk_coverage
+from benchmarks.judging.table import FIRST_SEED, seeds_of
 from benchmarks.judging.trial import CONFIG, Outcome, is_right_pair
 from benchmarks.paper.baselines.fpfh import fpfh_ransac
 from benchmarks.paper.baselines.kiss import kiss_gicp
@@ -61,9 +62,9 @@ class Rivals:
     def units(self, quick: bool) -> list[Unit]:
         """Scenario by scenario and seed by seed."""
         if quick:
-            return [{"scenario": name, "seed": 0} for name in QUICK]
+            return [{"scenario": name, "seed": FIRST_SEED} for name in QUICK]
         return [
-            {"scenario": n, "seed": seed} for n, count in SEEDS.items() for seed in range(count)
+            {"scenario": n, "seed": seed} for n, count in SEEDS.items() for seed in seeds_of(count)
         ]
 
     def measure(self, unit: Unit) -> Result:

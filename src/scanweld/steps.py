@@ -16,7 +16,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features, describe
 from scanweld.intake import Intake
 from scanweld.multiview.assemble import Settle, build_view_graph
-from scanweld.multiview.explain import find_doubts
+from scanweld.multiview.explain import doubt_alone, find_doubts
 from scanweld.multiview.given import easier_verdict, pairs_as_given, with_given
 from scanweld.multiview.merge import Judge, Poses, Tell
 from scanweld.multiview.refine_graph import Refine, refine_graph
@@ -180,8 +180,10 @@ def assess_placed(
             if found.confidence < config.confidence.min_good:
                 told = f"its pose is right with a probability of {found.confidence:.0%} only"
                 doubts.setdefault(k, told)
-        counts["doubtful"] = len(doubts)
-    return replace(graph, doubts=doubts), confidence
+        graph = replace(graph, doubts=doubts)
+        graph = replace(graph, doubts={**doubts, **doubt_alone(graph)})
+        counts["doubtful"] = len(graph.doubts)
+    return graph, confidence
 
 
 def _common_axis(

@@ -115,6 +115,12 @@ def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int
     return doubts
 
 
+def doubt_alone(graph: ViewGraph) -> dict[int, str]:
+    """Scans whose component has no other one without doubts: a pose is right beside others only."""
+    sure = [sorted(set(component.poses) - set(graph.doubts)) for component in graph.components]
+    return {scans[0]: "no other scan of its component is good" for scans in sure if len(scans) == 1}
+
+
 def _support(scan: int, graph: ViewGraph) -> float:
     return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
 

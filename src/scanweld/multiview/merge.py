@@ -7,6 +7,7 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
+from scanweld.pairs.marks import MIN_REFUTED
 from scanweld.pairs.result import (
     VIOLATION_WEIGHT,
     Evidence,
@@ -96,6 +97,10 @@ class Merge:
         return self.agree - VIOLATION_WEIGHT * self.violated - FREE_SHARE * self.free
 
 
+_Option = tuple[Merge, Sequence[Told]]
+_Refutes = Callable[[Sequence[Told], Sequence[Told]], bool]
+
+
 def propose_merges(
     a: Poses,
     b: Poses,
@@ -145,15 +150,22 @@ def _unrefuted(a: Poses, b: Poses, merges: Sequence[Merge], tell: Tell) -> list[
     if len(tied) < 2:
         return list(merges)
     told = [tell(a, {j: merge.a_from_b @ pose for j, pose in b.items()}) for merge in tied]
-    left = list(zip(tied, told, strict=True))
-    for refutes in (is_refuted_jointly, is_looked_past):
-        left = [
-            (merge, own)
-            for merge, own in left
-            if not any(refutes(own, other) for _, other in left if other is not own)
-        ]
-    refuted = [merge for merge in tied if not any(merge is one for one, _ in left)]
-    return [merge for merge in merges if not any(merge is one for one in refuted)]
+    left = _standing(list(zip(tied, told, strict=True)), is_refuted_jointly)
+    # Outlines also lack what a sensor missed: they speak only where surfaces have shown a mark.
+    if len(tied) - len(left) >= MIN_REFUTED:
+        left = _standing(left, is_looked_past)
+    refuted = set(tied) - {merge for merge, _ in left}
+    return [merge for merge in merges if merge not in refuted]
+
+
+def _standing(options: list[_Option], refutes: _Refutes) -> list[_Option]:
+    """Options that no other refutes; all of them if that leaves none."""
+    standing = [
+        (merge, own)
+        for merge, own in options
+        if not any(refutes(own, other) for _, other in options if other is not own)
+    ]
+    return standing or options
 
 
 def without(merges: Sequence[Merge], banned: Collection[tuple[int, int, int]]) -> list[Merge]:

@@ -25,8 +25,10 @@ MIN_MARK_PIXELS = 10
 """Pixels in such patches that refute a pose, or make a mark, at least."""
 MAX_REVERSE = 0.1
 """Share of them that may speak against the other pose; share of a mark that a rival may show."""
-MIN_PAST_PIXELS, MAX_PAST_REVERSE = 30, 0.3
-"""The same for pixels that sensors look past: outlines err by more than surfaces."""
+MIN_PAST_PIXELS = 30
+"""Pixels in patches that sensors look past refute a pose: outlines err by more than surfaces."""
+MAX_PAST_REVERSE = 0.3
+"""Share of them that sensors may look past in the other pose."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -85,8 +87,8 @@ def is_refuted_jointly(rival: Sequence[Told], pose: Sequence[Told]) -> bool:
 
 def is_looked_past(rival: Sequence[Told], pose: Sequence[Told]) -> bool:
     """Whether sensors look past pixels of any scans in rival poses, and far fewer in a pose."""
-    against = _looked_past(rival, pose)
-    return against >= MIN_PAST_PIXELS and _looked_past(pose, rival) <= MAX_PAST_REVERSE * against
+    against = _num_past(rival, pose)
+    return against >= MIN_PAST_PIXELS and _num_past(pose, rival) <= MAX_PAST_REVERSE * against
 
 
 def _against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
@@ -108,6 +110,6 @@ def reverse(rival: Sequence[Told], pose: Sequence[Told]) -> int:
     )
 
 
-def _looked_past(pose: Sequence[Told], other: Sequence[Told]) -> int:
+def _num_past(pose: Sequence[Told], other: Sequence[Told]) -> int:
     """Pixels of patches that sensors look past in a pose and not in the other."""
     return sum(int(np.count_nonzero(a.past & ~b.past)) for a, b in zip(pose, other, strict=True))
