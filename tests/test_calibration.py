@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 
+from benchmarks.calibration.collect import NUM_SETS, Sets
 from benchmarks.calibration.fit import count_frequencies, fit, held_out_probabilities, make_examples
 from benchmarks.calibration.learn import learn
 from benchmarks.calibration.page import calibration
 from benchmarks.calibration.report import measures
-from benchmarks.calibration.scenes import make_set
+from benchmarks.calibration.scenes import OTHER, make_set
 from benchmarks.calibration.solids import ODDS, SOLIDS, make_solid
 from benchmarks.judging.measures import calibration_error
+from benchmarks.judging.rivals import Rivals
+from benchmarks.judging.table import Runs
 from benchmarks.paper.study import Record
 from benchmarks.paper.success import auc
+from benchmarks.virtual.strangers import LIKE
 from scanweld.confidence.model import read_calibration
 from scanweld.geometry.arrays import BoolArray, FloatArray
 
@@ -34,6 +38,14 @@ def test_scenes_repeat_themselves():
     a, b = make_set(3), make_set(3)
     assert [scan.points.tobytes() for scan in a.scans] == [s.points.tobytes() for s in b.scans]
     assert 3 <= len(a.scans) <= 6
+
+
+def test_calibration_and_trust_have_no_seed_in_common():
+    learned = {unit["seed"] for unit in Sets().units(False)}
+    others = {seed + OTHER for seed in learned}
+    asked = {unit["seed"] for unit in [*Runs().units(False), *Rivals().units(False)]}
+    assert len(learned) == NUM_SETS and not asked & (learned | others)
+    assert not {seed + LIKE for seed in asked} & (learned | others)
 
 
 def known(count: int, seed: int) -> tuple[list[dict[str, float]], FloatArray, BoolArray]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.judging.measures import calibration_error
-from benchmarks.judging.trial import Outcome, PairOutcome, ScanOutcome
+from benchmarks.judging.trial import CRASH, Outcome, PairOutcome, ScanOutcome
 from benchmarks.paper.success import auc
 from benchmarks.sets import SETS
 from benchmarks.sets import Floors as SetFloors
@@ -36,7 +36,7 @@ class Floor:
 
 
 def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
-    """All floors, in the order of the issue."""
+    """All floors but those of the real sets."""
     scans = scans_of(outcomes)
     good = [scan for scan in scans if scan.is_good]
     false = sum(scan.is_false for scan in good)
@@ -61,6 +61,7 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
         _worst(outcomes, Group.CROP, MIN_CROP, "each crop alone"),
         _scale(outcomes),
         *_confidence(outcomes),
+        _ended(outcomes),
     ]
 
 
@@ -111,6 +112,16 @@ def names_factor(scan: ScanOutcome) -> bool:
     factors = [1.0 + number / 100.0 if is_percent else number for number, is_percent in told]
     true = (scan.factor, 1.0 / scan.factor)
     return "scale" in scan.reason and any(abs(f - t) < FACTOR_SLACK for f in factors for t in true)
+
+
+def _ended(outcomes: Sequence[Outcome]) -> Floor:
+    crashes = sum(outcome.verdict == CRASH for outcome in outcomes)
+    return Floor(
+        measure="runs that crash",
+        asked="0",
+        reached=f"{crashes} of {len(outcomes)}",
+        is_met=crashes == 0,
+    )
 
 
 def _asserted(outcomes: Sequence[Outcome]) -> Floor:
