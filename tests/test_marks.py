@@ -13,7 +13,7 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.multiview.explain import doubt_alone, find_doubts
-from scanweld.multiview.merge import Poses, propose_merges
+from scanweld.multiview.merge import Merge, Poses, propose_merges
 from scanweld.multiview.view_graph import Component, ViewGraph
 from scanweld.pairs.marks import Decided, decide
 from scanweld.pairs.pixels import see
@@ -28,6 +28,7 @@ from tests.view_graphs import exact_pair, pair_of, seen, world_of
 Radius = Callable[[FloatArray, FloatArray], FloatArray]
 TOLERANCE = 0.012
 NEAR_DEG, NEAR_SHIFT = 12.0, 0.06
+NOWHERE = np.zeros((4, 4), dtype=bool)
 
 
 def gear(turn: FloatArray, level: FloatArray) -> FloatArray:
@@ -199,6 +200,34 @@ def test_merges_that_another_one_refutes_are_no_rivals():
 
     (kept,) = propose_merges(*fixed, tell)
     assert (kept.a_from_b.inverse() @ right).angle_deg() < 1e-6 and kept.margin == 1.0
+
+
+@pytest.mark.parametrize(("kind", "num_left"), [(PairKind.SLIDING, 1), (PairKind.AMBIGUOUS, 2)])
+def test_what_slides_is_no_rival_of_what_a_mark_decides(kind: PairKind, num_left: int):
+    world = world_of(3)
+    right, other = (world[0].inverse() @ world[k] for k in (1, 2))
+    slid = right @ Pose(rotation=rotation_exp(np.array([0.0, 0.0, 1.0])), translation=np.zeros(3))
+    marked = pair_of(0, 1, PairKind.AMBIGUOUS, Alternative(i_from_j=right, evidence=seen(0.3)))
+    turn = Alternative(i_from_j=other.inverse() @ slid, evidence=seen(0.6))
+    slides = pair_of(1, 2, kind, replace(turn, i_from_j=turn.i_from_j.inverse()))
+    a, b = {0: Pose.identity(), 2: other}, {1: Pose.identity()}
+
+    def merges(is_marked: bool) -> list[Merge]:
+        pairs = {(0, 1): replace(marked, is_marked=is_marked), (1, 2): slides}
+        return propose_merges(
+            a,
+            b,
+            pairs,
+            [np.zeros(3)] * 3,
+            (5.0, 0.03),
+            lambda i, j, pose: seen(0.3),
+            lambda *_: [Told(agrees=NOWHERE, violates=NOWHERE, past=NOWHERE, max_pixels=1.0)],
+        )
+
+    assert len(merges(is_marked=False)) == 2
+    left = merges(is_marked=True)
+    assert len(left) == num_left
+    assert any((merge.a_from_b.inverse() @ right).angle_deg() < 1e-6 for merge in left)
 
 
 def test_what_only_a_mark_holds_is_doubtful():

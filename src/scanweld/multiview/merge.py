@@ -46,6 +46,8 @@ class Support:
         score: Its score.
         agree: Share of the samples that agree in it.
         is_good: Whether it is the best of a good pair, or of one that a mark decides.
+        is_marked: Whether it is the best of a pair that a mark decides.
+        is_sliding: Whether its pair slides.
         is_given: Whether it comes from start poses alone.
     """
 
@@ -55,6 +57,8 @@ class Support:
     score: float
     agree: float
     is_good: bool
+    is_marked: bool = False
+    is_sliding: bool = False
     is_given: bool = False
 
     @property
@@ -129,7 +133,7 @@ def propose_merges(
     merges = [_judged(a, b, motion, supports, judge) for motion, supports in clusters]
     merges.sort(key=lambda merge: -merge.score)
     if tell is not None:
-        merges = _unrefuted(a, b, merges, tell)
+        merges = _decided(_unrefuted(a, b, merges, tell))
     return [
         replace(merge, margin=margin_over(merge.score, [m.score for m in merges if m is not merge]))
         for merge in merges
@@ -168,6 +172,16 @@ def _standing(options: list[_Option], refutes: _Refutes) -> list[_Option]:
     return standing or options
 
 
+def _decided(merges: list[Merge]) -> list[Merge]:
+    """Merges without those that sliding pairs alone propose, if a mark decides for another one.
+
+    A pair that slides fits anywhere on its way. What it proposes there is chance.
+    """
+    if not any(support.is_marked for merge in merges for support in merge.supports):
+        return merges
+    return [merge for merge in merges if not all(s.is_sliding for s in merge.supports)]
+
+
 def without(merges: Sequence[Merge], banned: Collection[tuple[int, int, int]]) -> list[Merge]:
     """Merges that others than the banned alternatives (i, j, rank), i < j, propose too.
 
@@ -188,18 +202,22 @@ def _proposals(
     for i in sorted(a):
         for j in sorted(b):
             result = pairs.get((min(i, j), max(i, j)))
-            for rank, option in enumerate(result.alternatives if result else ()):
+            if result is None:
+                continue
+            for rank, option in enumerate(result.alternatives):
                 if option.score < MIN_CANDIDATE_SCORE:
                     continue
                 i_from_j = option.i_from_j if i < j else option.i_from_j.inverse()
-                is_sure = result is not None and (result.kind is PairKind.GOOD or result.is_marked)
+                is_good, is_marked = result.kind is PairKind.GOOD, result.is_marked
                 support = Support(
                     i=i,
                     j=j,
                     rank=rank,
                     score=option.score,
                     agree=option.evidence.agree,
-                    is_good=rank == 0 and is_sure,
+                    is_good=rank == 0 and (is_good or is_marked),
+                    is_marked=rank == 0 and is_marked,
+                    is_sliding=result.kind is PairKind.SLIDING,
                     is_given=option.is_given,
                 )
                 found.append((a[i] @ i_from_j @ b[j].inverse(), support))
