@@ -97,6 +97,7 @@ def made_record(seed: int) -> Record:
             "i": i,
             "j": j,
             "kind": "good",
+            "observability": 1.0,
             "accepted": k < 2,
             "grounds": {"agree": float(rng.normal(2.0 * (k < 2 and is_right))), "support": 0.0},
             "right": bool(k < 2 and is_right),

@@ -25,8 +25,9 @@ from scanweld.config import Config, FusionConfig
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.multiview.view_graph import Component, ViewGraph
-from scanweld.pairs.register import alternative_at, result_of
+from scanweld.pairs.alternatives import alternative_at
 from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult
+from scanweld.pairs.verdict import result_of
 from scanweld.pipeline import run
 from scanweld.reconstruction import Reconstruction
 from scanweld.steps import pair_judge
@@ -234,15 +235,22 @@ def test_no_pose_of_a_symmetric_object_is_believed(name: str):
     assert all((scan.confidence or 0.0) < 0.5 for scan in found.scans.values())
 
 
-def planted(pair: PreparedPair, i_from_j: Pose, kind: PairKind = PairKind.GOOD) -> float:
+def planted(
+    pair: PreparedPair,
+    i_from_j: Pose,
+    kind: PairKind = PairKind.GOOD,
+    observability: float | None = None,
+) -> float:
     """The confidence in a pose that somebody put into the view graph, of two scans alone."""
     config = Config()
     tolerance = config.pairs.tolerance_diameters[2]
     option = alternative_at(*pair.fields, i_from_j, tolerance * pair.diameter)
     result = result_of(0, 1, *pair.fields, (option,), pair.diameter, config.pairs)
+    seen = result.observability if observability is None else observability
+    result = replace(result, kind=kind, observability=seen)
     component = Component(poses={0: Pose.identity(), 1: i_from_j}, reference=0)
     graph = ViewGraph(
-        pairs={(0, 1): replace(result, kind=kind)},
+        pairs={(0, 1): result},
         accepted={(0, 1): option},
         rejected={},
         components=(component,),
@@ -278,7 +286,13 @@ def test_confidence_knows_no_unit_and_no_order():
     assert planted(turned_round, turned_round.i_from_j) == pytest.approx(believed, abs=1e-6)
 
 
-@pytest.mark.parametrize("kind", [PairKind.SLIDING, PairKind.AMBIGUOUS])
+@pytest.mark.parametrize("kind", [kind for kind in PairKind if kind is not PairKind.GOOD])
 def test_two_scans_alone_never_decide_what_they_leave_open(kind: PairKind):
     pair = creature_pair(40)
     assert planted(pair, pair.i_from_j, kind) == OPEN < 0.5
+
+
+def test_what_only_icp_holds_two_scans_alone_do_not_decide_either():
+    pair = creature_pair(40)
+    assert planted(pair, pair.i_from_j, observability=0.0) == OPEN
+    assert planted(pair, pair.i_from_j, observability=1e-2) > OPEN

@@ -310,7 +310,7 @@ def test_a_turntable_supports_a_thin_pair():
     for scan in scene.scans[1:]:
         assert_right(result, scene, FIRST, scan.name)
     assert verdicts(result) == {"turntable": FactVerdict.HELD}
-    assert "2 good pairs turn about one axis to within 0." in reason_of(result, "turntable")
+    assert "3 good pairs turn about one axis to within 0." in reason_of(result, "turntable")
 
 
 def test_a_scan_off_the_axis_is_refused_and_named():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanweld.config import GraphConfig
+from scanweld.config import GraphConfig, PairsConfig
 from scanweld.evaluation.primitives import lathe
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
@@ -15,9 +15,11 @@ from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.multiview.explain import doubt_alone, find_doubts
 from scanweld.multiview.merge import Merge, Poses, propose_merges
 from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.pairs.alternatives import alternative_at
+from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.marks import Decided, decide
 from scanweld.pairs.pixels import see
-from scanweld.pairs.register import alternative_at
+from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.pairs.told import Told, is_refuted_jointly, told_of
 from scanweld.pairs.turning import STEP_DEG, turn_to_mark
@@ -107,6 +109,22 @@ def test_a_worn_tooth_decides_between_the_turns_of_a_gear(noise: float):
     angle, shift = pair.off_by(found.pose.i_from_j)
     assert angle < 1.0 and shift < 0.01
     assert len(found.passed_over) == 7
+
+
+def registered(pair: PreparedPair) -> PairResult:
+    config = PairsConfig()
+    a, b = (even_anchors(field, config.num_anchors) for field in pair.fields)
+    return register_pair(0, 1, *pair.fields, [(a, b)], pair.diameter, config)
+
+
+def test_what_a_mark_decides_against_is_told():
+    pair = scanned(worn, 30.0, 35.0, 0.0005)
+    found = registered(pair)
+    assert pair.off_by(found.alternatives[0].i_from_j)[0] < 1.0
+    off = [pair.off_by(option.i_from_j)[0] for option in found.passed_over]
+    assert min(off) > NEAR_DEG
+    assert {45, 90, 180} <= {round(angle) for angle in off}
+    assert not registered(scanned(gear, 30.0, 35.0, 0.0005)).passed_over
 
 
 def test_turns_that_the_search_missed_are_found():

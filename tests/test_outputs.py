@@ -60,7 +60,7 @@ def test_graph(result: Reconstruction):
     pairs = graph_json(result)["pairs"]
     keys = "i j kind accepted reason i_from_j score overlap evidence margin observability sliding"
     for pair in pairs:
-        assert set(pair) == {*keys.split(), "confidence", "grounds", "alternatives"}
+        assert set(pair) == {*keys.split(), "confidence", "grounds", "alternatives", "passed_over"}
     assert [(pair["i"], pair["j"]) for pair in pairs] == [
         ("scan_1", "scan_2"),
         ("scan_1", "scan_10"),

@@ -12,12 +12,13 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features, describe
+from scanweld.pairs.alternatives import to_pose
 from scanweld.pairs.anchors import even_anchors, pair_anchors
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
 from scanweld.pairs.icp import IcpSchedule, icp
 from scanweld.pairs.information import information_of
-from scanweld.pairs.register import register_pair, to_pose
+from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.visibility import pose_rows
 from tests.prepared import PreparedPair, creature_pair, pair_of_scene, prepared_pair

@@ -187,6 +187,16 @@ def test_a_gear_is_named_by_its_teeth(fold: int):
     assert len(steps) and (np.abs(steps - np.round(steps)) * step < 2.0).all()
     best = weights_of(result.alternatives, CONFIG.min_margin, CONFIG.min_score)[0]
     assert best < 0.7
+    # Turns that explain the scans as well are kept, even if they are more than usual.
+    told = (*result.alternatives, *result.tied_too)
+    turns = [option.i_from_j.inverse() @ pair.i_from_j for option in told]
+    nearest = {round(turn.angle_deg() / step) for turn in turns if is_turn_by(step, turn)}
+    assert len(nearest) >= fold // 2
+    assert (len(turns) > CONFIG.num_alternatives) or fold < CONFIG.num_alternatives
+
+
+def is_turn_by(step: float, turn: Pose) -> bool:
+    return abs(turn.angle_deg() - step * round(turn.angle_deg() / step)) < 2.0
 
 
 def pair_result(

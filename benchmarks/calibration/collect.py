@@ -65,6 +65,7 @@ def _pair(pair: PairReport, scene: Scene) -> dict[str, Any]:
         "i": pair.i,
         "j": pair.j,
         "kind": str(pair.kind),
+        "observability": pair.observability,
         "accepted": pair.accepted,
         "grounds": dict(pair.grounds),
         "right": _is_right(pair.i, pair.j, pair.i_from_j, scene),

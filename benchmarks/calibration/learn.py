@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from scanweld.confidence.model import Calibration
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.multiview.view_graph import Component
-from scanweld.pairs.result import PairKind
+from scanweld.pairs.result import PairKind, PairResult
+from scanweld.pairs.verdict import no_pose
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -55,7 +56,7 @@ def learn(records: Sequence[Record], command: str) -> Learned:
     probability = held_out_probabilities(pairs)
     pair_confidence = np.array(
         [
-            close_open(float(p), PairKind(pair["kind"]), pair["grounds"], CONFIG)
+            close_open(float(p), _as_told(pair), pair["grounds"], CONFIG)
             for p, (_, pair) in zip(probability, rows, strict=True)
         ]
     )
@@ -80,6 +81,12 @@ def learn(records: Sequence[Record], command: str) -> Learned:
             ]
         ),
     )
+
+
+def _as_told(pair: Mapping[str, Any]) -> PairResult:
+    """A recorded pair, as far as its confidence asks what the two scans alone say."""
+    kind, observability = PairKind(pair["kind"]), pair["observability"]
+    return replace(no_pose(0, 1, ""), kind=kind, observability=observability)
 
 
 def _scan_examples(records: Sequence[Record], pair_confidence: FloatArray) -> Examples:

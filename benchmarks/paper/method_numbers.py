@@ -15,7 +15,7 @@ from benchmarks.paper.study import Record
 from benchmarks.paper.success import Limit, auc
 from benchmarks.paper.table2 import SWEEP_DEG
 from scanweld.config import Config
-from scanweld.pairs.register import _schedules
+from scanweld.pairs.alternatives import schedules
 from scanweld.pairs.result import Evidence
 
 Answer = dict[str, Any]
@@ -202,7 +202,7 @@ def _rms(record: Record) -> float:
 
 
 def _radii(which: int) -> str:
-    schedule = _schedules(1.0)[which]
+    schedule = schedules(1.0)[which]
     return f"{schedule.first_radius:g} to {schedule.last_radius:g}"
 
 
@@ -241,8 +241,8 @@ NUMBERS: dict[str, Callable[[Results], str]] = {
     "mm-icc-tau": partial(_sweep, method="mm-icc", key="tau"),
     "m-icc-tau": partial(_sweep, method="m-icc", key="tau"),
     "mm-icc-trim": partial(_sweep, method="mm-icc", key="trim"),
-    "icp-far-rounds": lambda _: str(_schedules(1.0)[0].num_rounds),
-    "icp-near-rounds": lambda _: str(_schedules(1.0)[1].num_rounds),
+    "icp-far-rounds": lambda _: str(schedules(1.0)[0].num_rounds),
+    "icp-near-rounds": lambda _: str(schedules(1.0)[1].num_rounds),
     "icp-far-radii": lambda _: _radii(0),
     "icp-near-radii": lambda _: _radii(1),
     **{

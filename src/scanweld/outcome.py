@@ -203,7 +203,8 @@ def _pair_report(
 ) -> PairReport:
     result = graph.pairs[edge]
     chosen = graph.accepted.get(edge) or result.best
-    weights = weights_of(result.alternatives, config.pairs.min_margin, config.pairs.min_score)
+    options = (*result.alternatives, *result.tied_too)
+    weights = weights_of(options, config.pairs.min_margin, config.pairs.min_score)
     a, b = (prepared[k] for k in edge)
     is_swapped = b.name < a.name
     first, second = (b, a) if is_swapped else (a, b)
@@ -229,7 +230,11 @@ def _pair_report(
             AlternativeReport(
                 i_from_j=between_scans(option.i_from_j), score=option.score, weight=weight
             )
-            for option, weight in zip(result.alternatives, weights, strict=True)
+            for option, weight in zip(options, weights, strict=True)
+        ),
+        passed_over=tuple(
+            AlternativeReport(i_from_j=between_scans(option.i_from_j), score=option.score)
+            for option in result.passed_over
         ),
     )
 

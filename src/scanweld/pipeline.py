@@ -19,7 +19,7 @@ from scanweld.outcome import conclude
 from scanweld.pairs.anchors import pair_anchors
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.register import register_pair
-from scanweld.pairs.result import PairResult
+from scanweld.pairs.result import RESULT_FORMAT, PairResult
 from scanweld.parallel import num_workers, single_threaded_algebra
 from scanweld.progress import Cache, NoCache, Progress, silent
 from scanweld.published import reconstruct_as_published
@@ -122,7 +122,7 @@ def _register_pairs(
         hashes = [intake.prepared[k].work_hash for k in edge]
         settings = (config.prepare, config.heat, config.pairs, config.contours, config.refine)
         start = intake.given.start_key(edge)
-        return work_key("pair", *hashes, intake.diameter, *settings, *start)
+        return work_key("pair", RESULT_FORMAT, *hashes, intake.diameter, *settings, *start)
 
     with stages.stage("pairs") as counts:
         results = stages.each("pairs", register, edges, key)

@@ -20,7 +20,7 @@ from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.outcome import conclude
 from scanweld.pairs.coarse import register_as_published
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.result import PairResult
+from scanweld.pairs.result import RESULT_FORMAT, PairResult
 from scanweld.pairs.rivals import judge_pose
 from scanweld.pairs.verdict import no_pose
 from scanweld.reconstruction import Reconstruction
@@ -92,7 +92,9 @@ def _register_pairs(
         hashes = [prepared[k].work_hash for k in edge]
         settings = (config.prepare, config.heat, config.coarse, config.contours, config.pairs)
         start = intake.given.start_key(edge)
-        return work_key("published pair", *hashes, intake.diameter, *settings, *start)
+        return work_key(
+            "published pair", RESULT_FORMAT, *hashes, intake.diameter, *settings, *start
+        )
 
     with stages.stage("pairs") as counts:
         results = stages.each("pairs", register, edges, key)

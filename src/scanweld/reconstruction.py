@@ -88,12 +88,13 @@ class AlternativeReport:
     Attributes:
         i_from_j: The pose.
         score: Its score.
-        weight: How much it counts beside the pair's other poses; they sum to 1.
+        weight: How much it counts beside the pair's other poses; they sum to 1. None where a mark
+            decides against it.
     """
 
     i_from_j: Pose
     score: float
-    weight: float
+    weight: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -114,6 +115,7 @@ class PairReport:
         observability: Smallest over largest eigenvalue of its information.
         sliding: What the surfaces slide like on each other, if the pair is a sliding one.
         alternatives: All distinct poses kept, best first.
+        passed_over: Poses that fit as well but for a small mark, which decides against them.
         confidence: Probability that i_from_j is right; 0 where nothing fits.
         grounds: What the confidence rests on, see docs/report.md.
     """
@@ -131,6 +133,7 @@ class PairReport:
     observability: float
     sliding: Slide | None = None
     alternatives: tuple[AlternativeReport, ...] = ()
+    passed_over: tuple[AlternativeReport, ...] = ()
     confidence: float = 0.0
     grounds: Mapping[str, float] = field(default_factory=dict)
 

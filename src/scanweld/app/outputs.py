@@ -91,6 +91,10 @@ def _pair(pair: PairReport) -> Json:
             {"i_from_j": _matrix(other.i_from_j), "score": other.score, "weight": other.weight}
             for other in pair.alternatives
         ],
+        "passed_over": [
+            {"i_from_j": _matrix(other.i_from_j), "score": other.score}
+            for other in pair.passed_over
+        ],
     }
 
 

@@ -20,7 +20,8 @@ from scanweld.multiview.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 
 OPEN = 0.49
-"""Most confidence in a pose that what was seen leaves open: it slides, or another fits as well."""
+"""Most confidence in a pose that what was seen leaves open: it slides, another fits as well, or too
+little speaks for it."""
 MIN_COHERENT_SCORE = 0.0
 """Score below which the contours of a pair that is not accepted are not looked at."""
 
@@ -64,9 +65,13 @@ def assess(
     return Confidence(pairs=pairs, scans=_assess_scans(graph, homes, pairs, calibration, config))
 
 
-def close_open(probability: float, kind: PairKind, grounds: Grounds, config: Config) -> float:
-    """A pair's probability, at most ``OPEN`` if nothing decides what its two scans leave open."""
-    if kind not in (PairKind.SLIDING, PairKind.AMBIGUOUS):
+def close_open(probability: float, pair: PairResult, grounds: Grounds, config: Config) -> float:
+    """A pair's probability, at most ``OPEN`` if it is not sure alone and nothing else decides.
+
+    A good pair that only its ICP holds is not sure alone.
+    """
+    is_firm = pair.observability >= config.pairs.min_observability
+    if pair.kind is PairKind.GOOD and is_firm:
         return probability
     is_decided = is_supported(grounds["support"]) and not _is_open(grounds, config)
     return probability if is_decided else min(probability, OPEN)
@@ -105,7 +110,7 @@ def _assess_pair(
     grounds = pair_grounds(result, chosen, looks, joint, is_accepted)
     probability = calibration.pair.probability(grounds)
     if (result.i, result.j) not in graph.remarks:
-        probability = close_open(probability, result.kind, grounds, config)
+        probability = close_open(probability, result, grounds, config)
     if result.is_marked:
         probability = min(probability, OPEN)
     return Assessed(confidence=probability, grounds=grounds)

@@ -9,9 +9,8 @@ from scanweld.multiview.explain import why_unplaced
 from scanweld.multiview.turntable import Turntable
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.register import result_of
 from scanweld.pairs.result import Alternative, PairKind, PairResult
-from scanweld.pairs.verdict import no_pose
+from scanweld.pairs.verdict import no_pose, result_of
 
 Reclassify = Callable[[Edge, tuple[Alternative, ...]], PairResult]
 """Classifies a pair anew by some of its poses, asking for less than usual of score and margin."""

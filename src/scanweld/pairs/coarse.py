@@ -11,17 +11,13 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features
 from scanweld.heat.matching import match_signatures
+from scanweld.pairs.alternatives import to_pose
 from scanweld.pairs.consensus import agreed_pose
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import make_field
 from scanweld.pairs.hypotheses import Anchors, sweep
 from scanweld.pairs.point_icp import PointAlignment, point_icp
-from scanweld.pairs.register import (
-    SAME_ANGLE_DEG,
-    SAME_SHIFT_DIAMETERS,
-    score_poses,
-    to_pose,
-)
+from scanweld.pairs.register import SAME_ANGLE_DEG, SAME_SHIFT_DIAMETERS, score_poses
 from scanweld.pairs.visibility import pose_rows
 
 MIN_MATCHES = 3

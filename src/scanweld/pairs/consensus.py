@@ -11,7 +11,7 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features
 from scanweld.heat.matching import signature_distances
-from scanweld.pairs.register import to_pose
+from scanweld.pairs.alternatives import to_pose
 
 LENGTH_TOLERANCE_DIAMETERS = 0.03
 """Two matches fit each other if the distances between their keypoints differ by less,"""

@@ -89,10 +89,10 @@ def decide(
         diameter: Diameter of the run.
         max_margin: Share of its score by which the best pose does not beat those that tie.
     """
-    ties = _ties(alternatives, max_margin)
-    if len(ties) < 2:
+    tied = ties(alternatives, max_margin)
+    if len(tied) < 2:
         return None
-    turns = _all_turns(ties, j.centre, refine, near, max_margin)
+    turns = _all_turns(tied, j.centre, refine, near, max_margin)
     if not MIN_REFUTED < len(turns) <= MAX_TURNS:
         return None
     seen = [see(i, j, option.i_from_j, diameter) for option in turns]
@@ -149,7 +149,7 @@ def _is_mark(
     )
 
 
-def _ties(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
+def ties(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
     """The best pose, and those that explain the scans about as well without contradictions."""
     if not alternatives:
         return []

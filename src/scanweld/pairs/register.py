@@ -7,18 +7,22 @@ import numpy as np
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.pose import Pose, nearest_rotation
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.alternatives import (
+    alternative_at,
+    refined_at,
+    schedules,
+    to_pose,
+)
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
 from scanweld.pairs.icp import IcpSchedule, icp
-from scanweld.pairs.information import information_of
-from scanweld.pairs.marks import Decided, decide
-from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult, near_best, weights_of
-from scanweld.pairs.symmetry import symmetry_of
+from scanweld.pairs.marks import Decided, decide, ties
+from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult
 from scanweld.pairs.turning import turn_to_mark
-from scanweld.pairs.verdict import classify_pair
-from scanweld.pairs.visibility import count_evidence, judge, kernel_view, mean_evidence, pose_rows
+from scanweld.pairs.verdict import result_of
+from scanweld.pairs.visibility import count_evidence, kernel_view, pose_rows
 
 SAME_ANGLE_DEG = 8.0
 """Hypotheses that differ by less than this,"""
@@ -30,16 +34,9 @@ RIVAL_SHIFT_DIAMETERS = 0.06
 """if the shift is, too."""
 MAX_SWEPT = 4000
 """Hypotheses of each set of anchors that are kept at all."""
-NUM_COARSE_SAMPLES = 200
-"""Samples of a scan that take part while many poses are looked at roughly,"""
-NUM_FINE_SAMPLES = 400
-"""and while those that are left are looked at closely."""
 NUM_RIVALS = 24
 """Distinct poses among which symmetries are looked for, at most."""
 RANKING_WEIGHTS = search_weights(VIOLATION_WEIGHT)
-ALIKE_SHARE = 0.5
-"""Rivals within this share of the margin that makes a pose sure show symmetries; those beaten more
-clearly are often chance."""
 NUM_POLISHED = 2
 """Alternatives that are refined with all points and contours, at most."""
 MIN_POLISHED_SCORE = -0.1
@@ -79,7 +76,7 @@ def register_pair(
         The result, with pose i_from_j between the sensor frames.
     """
     coarse, middle, fine = (t * diameter for t in config.tolerance_diameters)
-    far, near = _schedules(diameter)
+    far, near = schedules(diameter)
     poses = _swept(field_i, field_j, anchors, config.num_turns, coarse)
     poses = _distinct(poses, field_j, diameter, config.num_survivors[0])
     poses = _refined(field_i, field_j, poses, far, diameter, middle)
@@ -100,7 +97,7 @@ def register_pair(
     if start is not None:
         given = _from_start(field_i, field_j, start, diameter, fine, polish)
         alternatives = _with_given(alternatives, given, field_j, diameter)
-    return result_of(
+    result = result_of(
         i,
         j,
         field_i,
@@ -110,6 +107,19 @@ def register_pair(
         config,
         is_marked=decided is not None and decided.is_hidden_in_others,
     )
+    if decided is not None:
+        passed_over = _others(decided.passed_over, alternatives, field_j, diameter)
+        return replace(result, passed_over=passed_over)
+    tied = ties(_ranked(found), config.min_margin)
+    return replace(result, tied_too=_others(tied, alternatives, field_j, diameter))
+
+
+def _others(
+    options: Sequence[Alternative], told: Sequence[Alternative], j: ScanField, diameter: float
+) -> tuple[Alternative, ...]:
+    """Options that are the same answer as none of those told already, best first."""
+    left = [o for o in options if not any(is_same(o, one, j, diameter) for one in told)]
+    return tuple(_ranked(left))
 
 
 def _by_marks(
@@ -126,8 +136,7 @@ def _by_marks(
         return None
 
     def refine(poses: Sequence[Pose]) -> list[Alternative]:
-        rows = icp(i, j, pose_rows(list(poses)), schedule, diameter)
-        return [alternative_at(i, j, to_pose(row), tolerance) for row in rows]
+        return refined_at(i, j, poses, schedule, tolerance, diameter)
 
     near = np.radians(RIVAL_ANGLE_DEG), RIVAL_SHIFT_DIAMETERS * diameter
     free = config.min_observability
@@ -149,23 +158,6 @@ def _as_decided(
         )
     ]
     return [decided.pose, *others]
-
-
-def _schedules(diameter: float) -> tuple[IcpSchedule, IcpSchedule]:
-    """Of many poses roughly, and of those that are left closely."""
-    far = IcpSchedule(
-        num_rounds=8,
-        first_radius=0.08 * diameter,
-        last_radius=0.03 * diameter,
-        num_samples=NUM_COARSE_SAMPLES,
-    )
-    near = IcpSchedule(
-        num_rounds=15,
-        first_radius=0.05 * diameter,
-        last_radius=0.01 * diameter,
-        num_samples=NUM_FINE_SAMPLES,
-    )
-    return far, near
 
 
 def _swept(
@@ -226,7 +218,7 @@ def _from_start(
     polish: Polish | None,
 ) -> Alternative:
     """The best of a start pose, refined from near and from far: thin overlap may not pull right."""
-    far, near = _schedules(diameter)
+    far, near = schedules(diameter)
     rows = pose_rows([start])
     tries = [rows, icp(i, j, rows, near, diameter)]
     tries.append(icp(i, j, icp(i, j, rows, far, diameter), near, diameter))
@@ -275,44 +267,3 @@ def _distinct_at(
     angle = np.radians(RIVAL_ANGLE_DEG if rivals else SAME_ANGLE_DEG)
     shift = (RIVAL_SHIFT_DIAMETERS if rivals else SAME_SHIFT_DIAMETERS) * diameter
     return distinct_poses(poses, j.centre, angle, shift, count)
-
-
-def result_of(
-    i: int,
-    j: int,
-    field_i: ScanField,
-    field_j: ScanField,
-    alternatives: tuple[Alternative, ...],
-    diameter: float,
-    config: PairsConfig,
-    *,
-    is_marked: bool = False,
-) -> PairResult:
-    """The result of a pair from its distinct poses, the one to be judged first.
-
-    If only a mark decides for it, turns that hide the mark being left, then the pair stays
-    ambiguous, and no turn is free.
-    """
-    information, rms = np.zeros((6, 6)), float("nan")
-    rivals = near_best(alternatives, ALIKE_SHARE * config.min_margin)
-    weights = weights_of(rivals, config.min_margin, config.min_score)
-    poses = [rival.i_from_j for rival in rivals]
-    symmetry = symmetry_of(poses, weights, field_j.centre, diameter)
-    if alternatives:
-        radius = config.tolerance_diameters[2] * diameter
-        pose = alternatives[0].i_from_j
-        information, rms, _ = information_of(field_i, field_j, pose, radius, diameter)
-    return classify_pair(
-        i, j, alternatives, information, rms, symmetry, config, is_marked=is_marked
-    )
-
-
-def alternative_at(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> Alternative:
-    """A pose with its full evidence."""
-    evidence = mean_evidence(*judge(i, j, i_from_j, tolerance))
-    return Alternative(i_from_j=i_from_j, evidence=evidence)
-
-
-def to_pose(row: FloatArray) -> Pose:
-    """The pose of a kernel's row (12,)."""
-    return Pose(rotation=nearest_rotation(row[:9].reshape(3, 3)), translation=row[9:])

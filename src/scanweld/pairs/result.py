@@ -28,6 +28,8 @@ MIN_TOLD_SHARE = 0.15
 """The same of a rival of which one wants to know how much contradicts it."""
 
 
+RESULT_FORMAT = 2
+"""Raised when what is kept of a pair changes, so that work kept by another version is done anew."""
 MARGIN_WEIGHT = 2.0
 """Logarithm of the weight that a pose has over a rival which it beats by just the margin."""
 
@@ -216,6 +218,8 @@ class PairResult:
         symmetry: What the equally good poses of an ambiguous pair have in common.
         is_marked: Whether the best pose of an ambiguous pair is the one that explains a small mark,
             all others that tie being left out: they contradict it or hide it.
+        passed_over: Those others, best first, where a mark decides.
+        tied_too: More poses that explain the scans as well. They are told, and propose nothing.
     """
 
     i: int
@@ -230,6 +234,8 @@ class PairResult:
     sliding: Slippage | None = None
     symmetry: Symmetry | None = None
     is_marked: bool = False
+    passed_over: tuple[Alternative, ...] = ()
+    tied_too: tuple[Alternative, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.pose import Pose
+from scanweld.pairs.alternatives import alternative_at
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.field import ScanField
-from scanweld.pairs.register import alternative_at, is_same, register_pair, result_of
+from scanweld.pairs.register import is_same, register_pair
 from scanweld.pairs.result import PairKind, PairResult
+from scanweld.pairs.verdict import result_of
 
 
 def judge_pose(

@@ -78,10 +78,16 @@ def slippage_of(information: FloatArray, min_observability: float) -> Slippage |
         information: As ``information_of`` gives it.
         min_observability: Free is what has an eigenvalue below this share of the largest.
     """
+    free = free_motions(information, min_observability)
+    return _named(free.T) if len(free) else None
+
+
+def free_motions(information: FloatArray, min_observability: float) -> FloatArray:
+    """The orthonormal motions (K, 6) that an information (6, 6) leaves free, the freest first."""
     eigenvalues, vectors = np.linalg.eigh(information)
     largest = max(eigenvalues[-1], np.finfo(float).tiny)
     num_free = int((np.maximum(eigenvalues, 0.0) < min_observability * largest).sum())
-    return _named(vectors[:, :num_free]) if num_free else None
+    return vectors[:, :num_free].T
 
 
 def _named(free: FloatArray) -> Slippage:

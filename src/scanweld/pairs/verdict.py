@@ -1,13 +1,82 @@
 """What two scans alone say about their pose: good, sliding, ambiguous, contradicted, no overlap."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from scanweld.config import PairsConfig
 from scanweld.geometry.arrays import FloatArray
-from scanweld.pairs.information import observability_of
-from scanweld.pairs.result import MIN_AGREE, Alternative, PairKind, PairResult, margin_among
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.alternatives import refined_at, schedules
+from scanweld.pairs.field import ScanField
+from scanweld.pairs.holding import comes_back
+from scanweld.pairs.information import information_from, observability_of, two_way_matches
+from scanweld.pairs.result import (
+    MIN_AGREE,
+    Alternative,
+    PairKind,
+    PairResult,
+    margin_among,
+    near_best,
+    weights_of,
+)
 from scanweld.pairs.slippage import Slide, Slippage, slide_words, slippage_of
-from scanweld.pairs.symmetry import Symmetry
+from scanweld.pairs.symmetry import Symmetry, symmetry_of
+
+ALIKE_SHARE = 0.5
+"""Rivals within this share of the margin that makes a pose sure show symmetries; those beaten more
+clearly are often chance."""
+_NOTHING_MEETS = "no pose makes the scans overlap"
+
+
+def result_of(
+    i: int,
+    j: int,
+    field_i: ScanField,
+    field_j: ScanField,
+    alternatives: tuple[Alternative, ...],
+    diameter: float,
+    config: PairsConfig,
+    *,
+    is_marked: bool = False,
+) -> PairResult:
+    """The result of a pair from its distinct poses, the one to be judged first.
+
+    If only a mark decides for it, turns that hide the mark being left, then the pair stays
+    ambiguous, and no turn is free. A sure pose of which noise leaves no information, but which
+    comes back from wherever it is pushed, does not slide.
+    """
+    if not alternatives:
+        return no_pose(i, j, _NOTHING_MEETS)
+    best, tolerance = alternatives[0], config.tolerance_diameters[2] * diameter
+    matches = two_way_matches(field_i, field_j, best.i_from_j, tolerance)
+    information, rms, _ = information_from([matches], diameter)
+    symmetry = _symmetry_among(alternatives, field_j, diameter, config)
+
+    def classified(*, is_held: bool) -> PairResult:
+        found = information, rms, symmetry
+        flags = {"is_marked": is_marked, "is_held": is_held}
+        return classify_pair(i, j, alternatives, *found, config, **flags)
+
+    def refine(poses: Sequence[Pose]) -> list[Alternative]:
+        _, near = schedules(diameter)
+        return refined_at(field_i, field_j, poses, near, tolerance, diameter)
+
+    result = classified(is_held=False)
+    if result.kind is not PairKind.SLIDING or result.margin < config.min_margin:
+        return result
+    least = config.min_observability, config.min_margin
+    is_held = comes_back(best, information, matches[0], diameter, refine, *least)
+    return classified(is_held=is_held)
+
+
+def _symmetry_among(
+    alternatives: Sequence[Alternative], j: ScanField, diameter: float, config: PairsConfig
+) -> Symmetry | None:
+    """What the best pose has in common with those that fit nearly as well."""
+    alike = near_best(alternatives, ALIKE_SHARE * config.min_margin)
+    weights = weights_of(alike, config.min_margin, config.min_score)
+    return symmetry_of([option.i_from_j for option in alike], weights, j.centre, diameter)
 
 
 def classify_pair(
@@ -20,6 +89,7 @@ def classify_pair(
     config: PairsConfig,
     *,
     is_marked: bool = False,
+    is_held: bool = False,
 ) -> PairResult:
     """Give a pair its kind: what its evidence, margin and observability allow to say.
 
@@ -32,10 +102,11 @@ def classify_pair(
         symmetry: What the best pose and its rivals have in common; None without a rival.
         config: Settings.
         is_marked: Whether a mark alone decides, which some turns hide.
+        is_held: Whether the best pose does not slide, though there is no information.
     """
     margin = margin_among(alternatives[0], alternatives) if alternatives else 0.0
     sliding = slippage_of(information, config.min_observability)
-    if is_marked and sliding is not None and sliding.slide is Slide.REVOLUTION:
+    if is_held or (is_marked and sliding is not None and sliding.slide is Slide.REVOLUTION):
         sliding = None
     kind, reason = _kind(alternatives, sliding, margin, symmetry, config)
     is_marked = is_marked and kind is PairKind.GOOD
@@ -80,7 +151,7 @@ def _kind(
     config: PairsConfig,
 ) -> tuple[PairKind, str]:
     if not alternatives or alternatives[0].evidence.agree < MIN_AGREE:
-        return PairKind.NO_OVERLAP, "no pose makes the scans overlap"
+        return PairKind.NO_OVERLAP, _NOTHING_MEETS
     best = alternatives[0]
     if best.evidence.violation > config.max_violated_share * best.evidence.agree:
         told = f"{best.evidence.violation:.2f} violated, {best.evidence.agree:.2f} agreed"

@@ -1,0 +1,158 @@
+"""Poses that noise makes look free: pushed, they come back or they slide."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from scanweld.config import PairsConfig
+from scanweld.evaluation.primitives import cylinder, lathe, sphere
+from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.views import view_of
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.alternatives import alternative_at, refined_at, schedules
+from scanweld.pairs.holding import PUSH_DIAMETERS, comes_back
+from scanweld.pairs.icp import MIN_MATCHES
+from scanweld.pairs.information import information_from, observability_of, two_way_matches
+from scanweld.pairs.result import Alternative, PairKind
+from scanweld.pairs.slippage import free_motions
+from scanweld.pairs.verdict import result_of
+from tests.prepared import PreparedPair, pair_of_scene
+from tests.scenes import scene_of, small_creature
+from tests.view_graphs import seen
+
+CONFIG = PairsConfig()
+LEAST = CONFIG.min_observability, CONFIG.min_margin
+DIAMETER = 2.0
+POINTS = np.random.default_rng(0).uniform(-1, 1, size=(200, 3)) + np.array([0.0, 0.0, 5.0])
+ONE_FREE = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+TWO_FREE = np.diag([1.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+BEST = Alternative(i_from_j=Pose.exp([0.3, -0.1, 0.2, 1.0, 2.0, 3.0]), evidence=seen(0.5))
+
+
+def held(information: FloatArray, ends: Sequence[tuple[float, float]]) -> bool:
+    """Whether a pose is held, if of each push some share is left and the scans agree on so much."""
+    pushed = []
+
+    def refine(poses: Sequence[Pose]) -> list[Alternative]:
+        here = ends[len(pushed) : len(pushed) + len(poses)]
+        pushed.extend(poses)
+        motions = [pose @ BEST.i_from_j.inverse() for pose in poses]
+        return [
+            Alternative(i_from_j=part_of(motion, left) @ BEST.i_from_j, evidence=seen(agree))
+            for motion, (left, agree) in zip(motions, here, strict=True)
+        ]
+
+    found = comes_back(BEST, information, POINTS, DIAMETER, refine, *LEAST)
+    for pose in pushed:
+        moved = (pose @ BEST.i_from_j.inverse()).apply(POINTS) - POINTS
+        assert 0.02 < np.sqrt((moved**2).sum(axis=1).mean()) / DIAMETER < 3 * PUSH_DIAMETERS
+    return found
+
+
+def part_of(motion: Pose, share: float) -> Pose:
+    """A motion that takes the middle of the points, and turns, by a share of what another does."""
+    middle = Pose(rotation=np.eye(3), translation=POINTS.mean(axis=0))
+    return middle @ Pose.exp(share * (middle.inverse() @ motion @ middle).log()) @ middle.inverse()
+
+
+@pytest.mark.parametrize(
+    ("ends", "is_held"),
+    [
+        ([(0.0, 0.5), (0.0, 0.5)], True),
+        ([(0.2, 0.5), (0.1, 0.5)], True),
+        ([(1.0, 0.5), (1.0, 0.5)], False),
+        ([(0.5, 0.5), (0.0, 0.5)], False),
+        ([(0.0, 0.5), (2.0, 0.1)], True),
+        ([(0.0, 0.5), (2.0, 0.4)], False),
+        ([(2.0, 0.1), (2.0, 0.1)], False),
+    ],
+)
+def test_a_pose_is_held_if_it_comes_back_and_fits_nowhere_else(
+    ends: list[tuple[float, float]], is_held: bool
+):
+    assert held(ONE_FREE, ends) is is_held
+    assert held(TWO_FREE, [*ends, (0.0, 0.5), (0.0, 0.5)]) is is_held
+    assert held(TWO_FREE, [(0.0, 0.5), (0.0, 0.5), *ends]) is is_held
+
+
+def test_few_matches_hold_nothing():
+    few = POINTS[: MIN_MATCHES - 1]
+    assert not comes_back(BEST, ONE_FREE, few, DIAMETER, lambda poses: [BEST] * len(poses), *LEAST)
+    none = np.zeros((0, 3))
+    assert not comes_back(BEST, np.zeros((6, 6)), none, DIAMETER, lambda _: [], *LEAST)
+
+
+NOISE = NoiseModel(depth_diameters=0.005)
+
+
+@lru_cache
+def noisy_pair(body: str, gap: float) -> PreparedPair:
+    mesh = BODIES[body]
+    views = [
+        view_of(mesh, turn, 15.0, roll, pixels=140) for turn, roll in ((40, 0), (40 + gap, 70))
+    ]
+    return pair_of_scene(scene_of(mesh, views, noise=NOISE), 0, 1)
+
+
+def vase(turn: FloatArray, level: FloatArray) -> FloatArray:
+    return 26.0 + 10.0 * np.sin(8.2 * level + 0.3) + 0.0 * turn
+
+
+BODIES: dict[str, TriangleMesh] = {
+    "creature": small_creature(),
+    "sphere": sphere(),
+    "cylinder": cylinder(),
+    "vase": lathe(vase),
+}
+
+
+def pushed_back(pair: PreparedPair, information: FloatArray) -> bool:
+    tolerance = CONFIG.tolerance_diameters[2] * pair.diameter
+    best = alternative_at(*pair.fields, pair.i_from_j, tolerance)
+    matches = two_way_matches(*pair.fields, pair.i_from_j, tolerance)
+
+    def refine(poses: Sequence[Pose]) -> list[Alternative]:
+        _, near = schedules(pair.diameter)
+        return refined_at(*pair.fields, poses, near, tolerance, pair.diameter)
+
+    return comes_back(best, information, matches[0], pair.diameter, refine, *LEAST)
+
+
+def information_at_truth(pair: PreparedPair) -> FloatArray:
+    tolerance = CONFIG.tolerance_diameters[2] * pair.diameter
+    matches = two_way_matches(*pair.fields, pair.i_from_j, tolerance)
+    return information_from([matches], pair.diameter)[0]
+
+
+@pytest.mark.parametrize("body", ["sphere", "cylinder", "vase"])
+@pytest.mark.parametrize("gap", [20.0, 50.0])
+def test_what_truly_slides_stays_where_it_is_pushed(body: str, gap: float):
+    pair = noisy_pair(body, gap)
+    information = information_at_truth(pair)
+    assert len(free_motions(information, CONFIG.min_observability)) > 0
+    assert not pushed_back(pair, information)
+
+
+@pytest.mark.parametrize("gap", [20.0, 50.0])
+def test_a_figure_comes_back_along_any_motion(gap: float):
+    """Even if nothing at all is known of what is free."""
+    assert pushed_back(noisy_pair("creature", gap), np.zeros((6, 6)))
+
+
+def test_a_held_pair_is_good_though_it_has_no_information():
+    pair = noisy_pair("creature", 80.0)
+    tolerance = CONFIG.tolerance_diameters[2] * pair.diameter
+    option = alternative_at(*pair.fields, pair.i_from_j, tolerance)
+    # As if noise had drowned all but the firmest direction.
+    blind = CONFIG.model_copy(update={"min_observability": 0.5})
+    result = result_of(0, 1, *pair.fields, (option,), pair.diameter, blind)
+    assert observability_of(result.information) < 0.5
+    assert result.kind is PairKind.GOOD and result.sliding is None
+    twice = (option, replace(option, i_from_j=pair.i_from_j @ Pose.exp([0.5, 0, 0, 0, 0, 0])))
+    unsure = result_of(0, 1, *pair.fields, twice, pair.diameter, blind)
+    assert unsure.kind is PairKind.SLIDING and unsure.margin < CONFIG.min_margin
