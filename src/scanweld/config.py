@@ -85,7 +85,7 @@ class PairsConfig(Section):
     num_survivors: tuple[Count, Count] = (1600, 100)
     """Hypotheses that go on to the first and to the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
-    """Distinct poses that are kept for a pair."""
+    """Distinct poses of a pair that go on to the view graph."""
     min_score: float = Field(default=0.10, ge=0, le=1)
     """Score below which a pair is not accepted on its own."""
     max_violated_share: float = Field(default=0.5, ge=0)
@@ -143,6 +143,8 @@ class GraphConfig(Section):
     max_violated_share: float = Field(default=0.15, ge=0)
     """Samples that the other sensors contradict, as a share of those that agree, above which a
     merge is refused and a placed scan is doubtful."""
+    max_inner_violated_share: float = Field(default=0.075, ge=0)
+    """The same of a merge at second sight: all scans have settled in it, and edges say nothing."""
     max_violation: float = Field(default=0.03, ge=0)
     """Share of samples by which violation may exceed half the agreement in any pair across a
     merge."""

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 
 from scanweld.confidence.assess import Confidence, assess
 from scanweld.confidence.model import stored_calibration
@@ -23,6 +24,7 @@ from scanweld.multiview.refine_graph import Refine, refine_graph
 from scanweld.multiview.scale import estimate_scales
 from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.multiview.view_graph import Edge, ViewGraph
+from scanweld.pairs.edges import judge_off_edges, with_wide_edges
 from scanweld.pairs.field import ScanField, make_field
 from scanweld.pairs.pixels import see
 from scanweld.pairs.result import Evidence, PairResult
@@ -67,6 +69,20 @@ def pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> 
     def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
         both = judge(fields[i], fields[j], i_from_j, tolerance, NUM_JUDGED_SAMPLES)
         return mean_evidence(*both)
+
+    return judge_pair
+
+
+def off_edges_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
+    """The same with samples before the edges of what the other sensor saw left out."""
+    tolerance = config.pairs.tolerance_diameters[2] * diameter
+
+    @cache
+    def both(k: int) -> tuple[ScanField, ScanField]:
+        return fields[k], with_wide_edges(fields[k], tolerance)
+
+    def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
+        return judge_off_edges(both(i), both(j), i_from_j, tolerance, NUM_JUDGED_SAMPLES)
 
     return judge_pair
 
@@ -117,6 +133,7 @@ def place_scans(
             config.graph,
             given.apart,
             pixel_teller(fields, intake.diameter, config),
+            off_edges_judge(fields, intake.diameter, config),
         )
         graph = with_given(graph, pairs, given)
         counts["accepted"] = len(graph.accepted)

@@ -3,7 +3,8 @@
 import hashlib
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 from scanweld.config import GraphConfig
 from scanweld.geometry.arrays import FloatArray
@@ -16,11 +17,12 @@ from scanweld.multiview.merge import (
     Support,
     Tell,
     is_near,
+    not_only_by,
     propose_merges,
-    without,
+    rejudged,
 )
 from scanweld.multiview.view_graph import Component, Edge, ViewGraph
-from scanweld.pairs.result import MIN_AGREE, Alternative, PairKind, PairResult
+from scanweld.pairs.result import MIN_AGREE, Alternative, PairKind, PairResult, margin_over
 
 logger = logging.getLogger(__name__)
 
@@ -54,6 +56,7 @@ class _Problem:
     near: tuple[float, float]
     judge: Judge
     tell: Tell | None
+    judge_off_edges: Judge
     settle: Settle
     config: GraphConfig
     apart: Collection[Edge]
@@ -68,6 +71,11 @@ class _Memory:
     settled: dict[bytes, Poses]
 
 
+_Dependent = frozenset[tuple[int, int, int]]
+_Sight = Callable[[_Problem, Poses, Poses, _Dependent], Merge | None]
+_Known = dict[tuple[_Sight, tuple[int, ...], tuple[int, ...]], Merge | None]
+
+
 def build_view_graph(
     num_scans: int,
     pairs: Mapping[Edge, PairResult],
@@ -78,13 +86,14 @@ def build_view_graph(
     config: GraphConfig,
     apart: Collection[Edge] = (),
     tell: Tell | None = None,
+    judge_off_edges: Judge | None = None,
 ) -> ViewGraph:
     """Place all scans that the pairs can place without contradiction.
 
     Components grow by the best merge that passes: one good pair, or several pairs that propose
     the same motion, with every implied pair across free of contradictions. Where good pairs end
-    up outside, the merges that may have shut them out are taken back one at a time, and the
-    assembly that explains most is kept.
+    up outside, the merges that may have shut them out are taken back one at a time, so that a
+    pair that made them counts only beside others, and the assembly that explains most is kept.
 
     Args:
         num_scans: How many scans there are.
@@ -96,6 +105,8 @@ def build_view_graph(
         config: Settings.
         apart: Pairs whose scans no merge may lay onto each other.
         tell: Gives what all pixels of two components say of each other, where merges are tied.
+        judge_off_edges: Gives the evidence without what edges say, for merges that fail at first
+            sight; ``judge`` if there is none.
     """
     near = (config.max_cycle_deg, config.max_cycle_diameters * diameter)
     problem = _Problem(
@@ -105,34 +116,32 @@ def build_view_graph(
         near=near,
         judge=judge,
         tell=tell,
+        judge_off_edges=judge_off_edges or judge,
         settle=settle,
         config=config,
         apart=apart,
     )
     best = _assemble(problem, frozenset())
-    banned: frozenset[tuple[int, int, int]] = frozenset()
+    dependent: _Dependent = frozenset()
     for _ in range(MAX_RETRIES):
-        trials = [banned | {suspect} for suspect in _suspects(problem, best)]
+        trials = [dependent | {suspect} for suspect in _suspects(problem, best)]
         outcomes = [(_assemble(problem, trial), trial) for trial in trials]
         better = max(outcomes, key=lambda outcome: outcome[0].support, default=None)
         if better is None or better[0].support <= best.support * 1.02:
             break
-        best, banned = better
-        logger.info("took back pair %s: the rest then agrees", sorted(banned))
+        best, dependent = better
+        logger.info("took back pairs %s alone: the rest then agrees", sorted(dependent))
     return _graph(problem, best)
 
 
-def _assemble(problem: _Problem, banned: frozenset[tuple[int, int, int]]) -> _Assembly:
+def _assemble(problem: _Problem, dependent: _Dependent) -> _Assembly:
+    """Merge greedily; dependent alternatives propose nothing that no other one proposes."""
     components: list[Mapping[int, Pose]] = [{k: Pose.identity()} for k in range(problem.num_scans)]
-    known: dict[tuple[tuple[int, ...], tuple[int, ...]], Merge | None] = {}
     used: list[Support] = []
-    while True:
-        found = _best_merge(problem, components, banned, known)
-        if found is None:
-            break
+    known: _Known = {}
+    while (found := _best_merge(problem, components, dependent, known)) is not None:
         merge, a, b = found
-        moved = {k: merge.a_from_b @ pose for k, pose in components[b].items()}
-        merged = dict(sorted({**components[a], **moved}.items()))
+        merged = _merged(merge, components[a], components[b])
         used.extend(merge.supports)
         components = [c for n, c in enumerate(components) if n not in (a, b)]
         components.append(_settled(problem, merged))
@@ -144,20 +153,81 @@ def _assemble(problem: _Problem, banned: frozenset[tuple[int, int, int]]) -> _As
 def _best_merge(
     problem: _Problem,
     components: list[Mapping[int, Pose]],
-    banned: frozenset[tuple[int, int, int]],
-    known: dict[tuple[tuple[int, ...], tuple[int, ...]], Merge | None],
+    dependent: _Dependent,
+    known: _Known,
 ) -> tuple[Merge, int, int] | None:
-    best: tuple[Merge, int, int] | None = None
-    for a in range(len(components)):
-        for b in range(a + 1, len(components)):
-            key = (tuple(components[a]), tuple(components[b]))
+    """The best merge that passes at first sight; if there is none, at second."""
+    for sight in (_at_first_sight, _at_second_sight):
+        found = []
+        for a, b in combinations(range(len(components)), 2):
+            key = (sight, tuple(components[a]), tuple(components[b]))
             if key not in known:
-                merges = without(_merges(problem, components[a], components[b]), banned)
-                known[key] = merges[0] if merges and passes(merges[0], problem.config) else None
-            merge = known[key]
-            if merge is not None and (best is None or merge.score > best[0].score):
-                best = (merge, a, b)
-    return best
+                known[key] = sight(problem, components[a], components[b], dependent)
+            if (merge := known[key]) is not None:
+                found.append((merge, a, b))
+        if found:
+            return max(found, key=lambda option: option[0].score)
+    return None
+
+
+def _at_first_sight(problem: _Problem, a: Poses, b: Poses, dependent: _Dependent) -> Merge | None:
+    """The best way to merge two components, if it passes as it is proposed."""
+    merges = not_only_by(dependent, _merges(problem, a, b))
+    config = problem.config
+    return merges[0] if merges and passes(merges[0], config, config.max_violated_share) else None
+
+
+def _at_second_sight(problem: _Problem, a: Poses, b: Poses, dependent: _Dependent) -> Merge | None:
+    """The best way to merge two components, if it passes settled, and with edges forgiven.
+
+    Of noisy scans, two make errors that all the others deny: the pose of one pair is off where it
+    is carried over to those far from it, and samples fall beside edges. So at second sight all
+    scans settle first, and edges say nothing; of what is left less may be violated.
+    """
+    merges = not_only_by(dependent, _merges(problem, a, b))
+    if not merges or not _deserves_second_sight(merges[0], a, b, problem.config):
+        return None
+    best = merges[0]
+    proposed = _merged(best, a, b)
+    settled = _settled(problem, proposed)
+    if not _stayed(problem, proposed, settled):
+        return None
+    second = _off_edges(problem, best, a, b, settled)
+    rivals = [
+        _off_edges(problem, merge, a, b, _merged(merge, a, b)).score
+        for merge in _merges(problem, a, b)
+        if merge.a_from_b is not best.a_from_b
+    ]
+    second = replace(second, margin=min(best.margin, margin_over(second.score, rivals)))
+    passed = passes(second, problem.config, problem.config.max_inner_violated_share)
+    return second if passed else None
+
+
+def _deserves_second_sight(merge: Merge, a: Poses, b: Poses, config: GraphConfig) -> bool:
+    has_support = any(s.is_good for s in merge.supports) or merge.num_voices > 1
+    is_clear = merge.score > 0 and merge.margin >= config.min_margin
+    return has_support and is_clear and len(a) + len(b) > 2
+
+
+def _stayed(problem: _Problem, proposed: Poses, settled: Poses) -> bool:
+    """Whether scans, settled, are still where they were beside the first one."""
+    first = min(proposed)
+    was, has = proposed[first].inverse(), settled[first].inverse()
+    return all(
+        is_near(was @ proposed[k], has @ settled[k], problem.centres[k], problem.near)
+        for k in proposed
+    )
+
+
+def _off_edges(problem: _Problem, merge: Merge, a: Poses, b: Poses, poses: Poses) -> Merge:
+    """The merge as all scans judge it in these poses, edges forgiven."""
+    both = {k: poses[k] for k in a}, {k: poses[k] for k in b}
+    return rejudged(merge, *both, problem.judge_off_edges)
+
+
+def _merged(merge: Merge, a: Poses, b: Poses) -> Poses:
+    moved = {k: merge.a_from_b @ pose for k, pose in b.items()}
+    return dict(sorted({**a, **moved}.items()))
 
 
 def _merges(problem: _Problem, a: Poses, b: Poses) -> list[Merge]:
@@ -198,11 +268,11 @@ def _content(poses: Poses) -> bytes:
     return digest.digest()
 
 
-def passes(merge: Merge, config: GraphConfig) -> bool:
+def passes(merge: Merge, config: GraphConfig, max_violated_share: float) -> bool:
     """Whether a merge may be made: supported well enough, contradicted by no pair across."""
     if merge.worst > config.max_violation or merge.margin < config.min_margin:
         return False
-    if merge.violated > config.max_violated_share * merge.agree:
+    if merge.violated > max_violated_share * merge.agree:
         return False
     if any(support.is_good for support in merge.supports):
         return merge.score > 0

@@ -182,17 +182,20 @@ def _decided(merges: list[Merge]) -> list[Merge]:
     return [merge for merge in merges if not all(s.is_sliding for s in merge.supports)]
 
 
-def without(merges: Sequence[Merge], banned: Collection[tuple[int, int, int]]) -> list[Merge]:
-    """Merges that others than the banned alternatives (i, j, rank), i < j, propose too.
+def not_only_by(
+    dependent: Collection[tuple[int, int, int]], merges: Sequence[Merge]
+) -> list[Merge]:
+    """Merges that others than the dependent alternatives (i, j, rank), i < j, propose too.
 
-    Their margins stay: what may not propose is a rival still, and taking a pair back does not make
-    another one surer.
+    Dependent ones count like weak pairs there. Margins stay: what may not propose is a rival
+    still, and taking a pair back does not make another one surer.
     """
-    left = [
-        replace(merge, supports=tuple(s for s in merge.supports if s.alternative not in banned))
-        for merge in merges
-    ]
-    return [merge for merge in left if merge.supports]
+    left = [m for m in merges if not all(s.alternative in dependent for s in m.supports)]
+    return [replace(m, supports=tuple(_demoted(s, dependent) for s in m.supports)) for m in left]
+
+
+def _demoted(support: Support, dependent: Collection[tuple[int, int, int]]) -> Support:
+    return replace(support, is_good=False) if support.alternative in dependent else support
 
 
 def _proposals(
@@ -253,6 +256,12 @@ def is_near(p: Pose, q: Pose, middle: FloatArray, near: tuple[float, float]) -> 
     """Whether two motions differ by less than an angle (degrees) and a shift of the middle."""
     apart = p.inverse() @ q
     return apart.shift_at(middle) < near[1] and apart.angle_deg() < near[0]
+
+
+def rejudged(merge: Merge, a: Poses, b: Poses, judge: Judge) -> Merge:
+    """The merge with another judge's evidence at other poses of its scans, all in one frame."""
+    said = _judged(a, b, Pose.identity(), merge.supports, judge)
+    return replace(said, a_from_b=merge.a_from_b, margin=merge.margin)
 
 
 def _judged(
