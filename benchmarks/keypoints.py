@@ -27,7 +27,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat import Features, describe
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 from sets import data_folder
 
 GAPS_DEG = (30, 50, 70, 90)

@@ -24,6 +24,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.surface.surface_defects import surface_defects
+from benchmarks.surface.surface_fit import fit_surface
 from model_tables import fidelity_table, many_table, rivals_table
 from results import write_results
 from rivals import Shape, poisson, shape_of, tsdf
@@ -31,9 +33,7 @@ from run import timed
 from scanweld.config import Config, FusionConfig
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.simulate import simulate
-from scanweld.evaluation.surface_defects import surface_defects
 from scanweld.evaluation.surface_errors import sample_surface, surface_distances
-from scanweld.evaluation.surface_fit import fit_surface
 from scanweld.fusion import fuse, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
@@ -42,10 +42,10 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_mesh, read_poses, read_scan
-from scanweld.parallel import map_in_order, single_threaded_algebra
-from scanweld.pipeline import run as reconstruct
-from scanweld.prepare import prepare
-from scanweld.stages import peak_memory_mb
+from scanweld.pipeline.run import run as reconstruct
+from scanweld.preparation import prepare
+from scanweld.work.stage_log import peak_memory_mb
+from scanweld.work.threads import map_in_order, single_threaded_algebra
 from sets import BUNNY, data_folder
 
 KINDS = ("virtual", "real", "many")

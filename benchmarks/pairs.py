@@ -31,15 +31,15 @@ from scanweld.evaluation.metrics import (
     MAX_TRANSLATION_PERCENT,
     object_diameter,
 )
+from scanweld.evidence.field import make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
 from scanweld.io import read_poses, read_scan
-from scanweld.pairs.field import make_field
 from scanweld.pairs.result import Alternative, PairKind, PairResult
-from scanweld.parallel import map_in_order, single_threaded_algebra
-from scanweld.pipeline import pair_registrar
-from scanweld.prepare.prepare import prepare
+from scanweld.pipeline.robust import pair_registrar
+from scanweld.preparation.prepare import prepare
+from scanweld.work.threads import map_in_order, single_threaded_algebra
 from sets import BUNNY, data_folder, dragon, moved_scans
 
 Keypoints = Literal["mixed", "heat", "even"]

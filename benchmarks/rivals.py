@@ -16,8 +16,8 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.rasterize import render_depth
-from scanweld.prepare.prepare import surface_points
-from scanweld.prepare.range_image import render_surface
+from scanweld.preparation.prepare import surface_points
+from scanweld.preparation.range_image import render_surface
 
 TRUNCATION_VOXELS = 4.0
 MAX_BLOCKS = 100_000

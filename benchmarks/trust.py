@@ -31,7 +31,7 @@ from benchmarks.judging.table import CODE as TRUST_CODE
 from benchmarks.judging.table import Runs
 from benchmarks.paper.study import Study, Table
 from benchmarks.virtual.scenarios import SCENARIOS
-from scanweld.parallel import num_workers
+from scanweld.work.threads import num_workers
 
 DOCS = Path(__file__).parents[1] / "docs"
 COLUMNS = (

@@ -10,12 +10,12 @@ import scanweld
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.field import make_field
 from scanweld.heat.features import describe
 from scanweld.pairs.anchors import pair_anchors
-from scanweld.pairs.field import make_field
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairResult
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 
 def register(scans: Sequence[scanweld.RangeScan]) -> PairResult:

@@ -8,7 +8,7 @@ import scanweld
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.simulate import simulate
 from scanweld.fusion import fuse
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 
 def fuse_posed(

@@ -14,7 +14,7 @@ import numpy as np
 import scanweld
 from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.shading import render_shaded, side_by_side, write_png
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 VIEW = np.array([0.75, 1.0, 0.4])
 SIZE = 520

@@ -13,7 +13,7 @@ from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
 from scanweld.geometry.scan import RangeScan, Viewpoint
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 from tests.scenes import random_motion
 
 CONFIG = PrepareConfig()

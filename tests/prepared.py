@@ -6,12 +6,12 @@ from functools import lru_cache
 import numpy as np
 
 from scanweld.config import PrepareConfig
+from scanweld.evidence.field import ScanField, make_field
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
-from scanweld.pairs.field import ScanField, make_field
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 from tests.scenes import Scene, pair_at_gap
 
 

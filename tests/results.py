@@ -6,21 +6,22 @@ import numpy as np
 
 from scanweld.config import Config
 from scanweld.errors import InputError
+from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.knowledge import Knowledge
-from scanweld.pairs.result import Evidence, PairKind
-from scanweld.progress import Cache, NoCache, Progress, StageAdvanced, silent
+from scanweld.knowledge.facts import Knowledge
+from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import (
     AlternativeReport,
     PairReport,
     Reconstruction,
     ScanReport,
     ScanVerdict,
-    StageReport,
     Verdict,
 )
+from scanweld.work.progress import Cache, NoCache, Progress, StageAdvanced, silent
+from scanweld.work.stage_log import StageReport
 
 EVIDENCE = Evidence(agree=0.5, front=0.01, contradict=0.02, free=0.03, occluded=0.34, unknown=0.1)
 

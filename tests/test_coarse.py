@@ -10,9 +10,9 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.point_fit import num_trusted
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.heat import Features, describe
-from scanweld.heat.matching import match_signatures
-from scanweld.pairs.coarse import CoarseAnswer, register_as_published
-from scanweld.pairs.point_icp import point_icp
+from scanweld.published.coarse import CoarseAnswer, register_as_published
+from scanweld.published.point_icp import point_icp
+from scanweld.published.signature_matching import match_signatures
 from tests.prepared import PreparedPair, creature_pair
 
 KEYPOINTS = CoarseConfig(icp="keypoints")

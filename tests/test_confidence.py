@@ -22,15 +22,16 @@ from scanweld.confidence.model import (
 )
 from scanweld.confidence.witnesses import Looks, Witnesses, witnesses_of
 from scanweld.config import Config, FusionConfig
+from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.graph.view_graph import Component, ViewGraph
 from scanweld.pairs.alternatives import alternative_at
-from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult
+from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.pairs.verdict import result_of
-from scanweld.pipeline import run
+from scanweld.pipeline.run import run
+from scanweld.pipeline.stages import pair_judge
 from scanweld.reconstruction import Reconstruction
-from scanweld.steps import pair_judge
 from tests.prepared import PreparedPair, creature_pair
 from tests.scenes import MILD_NOISE, Scene, creature_scene, pair_at_gap, primitive_scene
 

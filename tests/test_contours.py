@@ -21,8 +21,6 @@ from scanweld.contours.contour_sets import (
     near_side,
     observe_contours,
 )
-from scanweld.contours.mm_icc import mm_icc
-from scanweld.contours.outer_loop import ContourAlignment
 from scanweld.contours.predict import predict_contours
 from scanweld.contours.prune import (
     prune_invisible_observed,
@@ -34,7 +32,9 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
+from scanweld.published.mm_icc import mm_icc
+from scanweld.published.outer_loop import ContourAlignment
 from tests.prepared import PreparedPair, creature_pair
 
 MODELS = [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC]

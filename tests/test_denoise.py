@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanweld.prepare.denoise import clean_depth, has_gaps, noise_of, smoothing_radius
+from scanweld.preparation.denoise import clean_depth, has_gaps, noise_of, smoothing_radius
 
 PIXEL = 0.5
 MAX_STEP = 6 * PIXEL

@@ -18,13 +18,12 @@ from benchmarks.paper.study import Study, read_records
 from benchmarks.paper.tables import table, table_names
 from scanweld.config import Config
 from scanweld.errors import InputError
-from scanweld.multiview import turntable
-from scanweld.multiview.explain import OUTWEIGHED
-from scanweld.multiview.refine_graph import MAX_SCORE_LOSS
+from scanweld.evidence.evidence import CONTRADICT_WEIGHT, FREE_WEIGHT, MIN_AGREE, VIOLATION_WEIGHT
+from scanweld.evidence.visibility import AGREE_COSINE, CONTRADICT_COSINE
+from scanweld.graph.reasons import OUTWEIGHED
+from scanweld.graph.refine_graph import MAX_SCORE_LOSS
+from scanweld.knowledge import turntable
 from scanweld.pairs import register
-from scanweld.pairs.result import CONTRADICT_WEIGHT, FREE_WEIGHT, VIOLATION_WEIGHT
-from scanweld.pairs.verdict import MIN_AGREE
-from scanweld.pairs.visibility import AGREE_COSINE, CONTRADICT_COSINE
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -6,7 +6,7 @@ import numpy as np
 
 from scanweld.config import Config, FusionConfig
 from scanweld.evaluation.scanner import NoiseModel
-from scanweld.pipeline import run
+from scanweld.pipeline.run import run
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 from tests.prepared import scaled
 from tests.scenes import creature_scene

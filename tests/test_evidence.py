@@ -5,11 +5,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.visibility import judge, mean_evidence
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.result import Evidence
-from scanweld.pairs.visibility import judge, mean_evidence
 from tests.prepared import PreparedPair, creature_pair
 
 MODELS = (CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC)

@@ -8,7 +8,7 @@ import pytest
 from scanweld.errors import KnowledgeError
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, write_poses
-from scanweld.knowledge import Knowledge, read_knowledge
+from scanweld.knowledge.facts import Knowledge, read_knowledge
 from tests.test_knowledge import FIRST, run, seen_from
 
 

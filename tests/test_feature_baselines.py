@@ -7,6 +7,16 @@ import numpy as np
 import pytest
 import trimesh
 
+from benchmarks.features.full_mesh_hks import (
+    full_mesh_hks,
+    full_mesh_keypoints,
+    full_mesh_spectrum,
+    thin_mesh,
+)
+from benchmarks.features.harris3d import harris_keypoints, harris_response
+from benchmarks.features.si_hks import octave_times, si_heat_signature
+from benchmarks.features.spectrum import Spectrum, spectrum_of, values_at
+from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
 from benchmarks.paper import features
 from benchmarks.paper.baselines import feature_views
 from benchmarks.paper.baselines.feature_views import DESCRIPTORS, DETECTORS
@@ -14,16 +24,6 @@ from benchmarks.paper.features import QUESTIONS, answer
 from benchmarks.paper.optional import need
 from benchmarks.paper.study import Record
 from scanweld.errors import InputError
-from scanweld.evaluation.full_mesh_hks import (
-    full_mesh_hks,
-    full_mesh_keypoints,
-    full_mesh_spectrum,
-    thin_mesh,
-)
-from scanweld.evaluation.harris3d import harris_keypoints, harris_response
-from scanweld.evaluation.si_hks import octave_times, si_heat_signature
-from scanweld.evaluation.spectrum import Spectrum, spectrum_of, values_at
-from scanweld.evaluation.wks import energy_bands, wave_distances, wave_signature
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import random_rotation

@@ -12,8 +12,8 @@ from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.prepared import PixelKind, PreparedScan
-from scanweld.prepare import prepare
-from scanweld.prepare.silhouette import classify_pixels, close
+from scanweld.preparation import prepare
+from scanweld.preparation.silhouette import classify_pixels, close
 from tests.depth_scans import (
     CONFIG,
     MODELS,

@@ -23,7 +23,7 @@ from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.shading import render_shaded, side_by_side, write_png
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 RADIUS = 50.0
 SIX_SIDES = [(0, 0), (90, 0), (180, 0), (270, 0), (0, 89), (0, -89)]

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from scanweld.config import GraphConfig, PairsConfig
 from scanweld.geometry.pose import Pose, random_rotation
-from scanweld.multiview.assemble import build_view_graph
-from scanweld.multiview.given import Given, pairs_as_given, with_given
-from scanweld.multiview.turntable import Turntable, find_turntable, off_axis_doubts
-from scanweld.multiview.view_graph import Component, Edge, ViewGraph
+from scanweld.graph.assemble import build_view_graph
+from scanweld.graph.view_graph import Component, Edge, ViewGraph
+from scanweld.knowledge.given import Given, pairs_as_given, with_given
+from scanweld.knowledge.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult

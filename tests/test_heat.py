@@ -26,7 +26,7 @@ from scanweld.heat.keypoints import group, persistent_maxima
 from scanweld.heat.laplacian import eigenpairs
 from scanweld.heat.signature import diffusion_times, heat_signature, sun_times
 from scanweld.heat.surface import heat_surface
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 from tests.scenes import MILD_NOISE, small_creature
 
 CONFIG = HeatConfig(max_front_vertices=1000, num_modes=80)

@@ -11,15 +11,15 @@ from scanweld.config import PairsConfig
 from scanweld.evaluation.primitives import cylinder, lathe, sphere
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.icp import MIN_MATCHES
+from scanweld.evidence.information import information_from, observability_of, two_way_matches
+from scanweld.evidence.slippage import free_motions
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.alternatives import alternative_at, refined_at, schedules
 from scanweld.pairs.holding import PUSH_DIAMETERS, comes_back
-from scanweld.pairs.icp import MIN_MATCHES
-from scanweld.pairs.information import information_from, observability_of, two_way_matches
 from scanweld.pairs.result import Alternative, PairKind
-from scanweld.pairs.slippage import free_motions
 from scanweld.pairs.verdict import result_of
 from tests.prepared import PreparedPair, pair_of_scene
 from tests.scenes import scene_of, small_creature

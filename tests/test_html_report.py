@@ -23,11 +23,11 @@ from scanweld.app.outputs import write_outputs
 from scanweld.config import Config, FusionConfig, PrepareConfig
 from scanweld.errors import InputError, ReadError
 from scanweld.evaluation.primitives import sphere
+from scanweld.evidence.slippage import Slide
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.io import write_scan_ply
 from scanweld.pairs.result import PairKind
-from scanweld.pairs.slippage import Slide
-from scanweld.prepare.support import find_support
+from scanweld.preparation.support import find_support
 from scanweld.reconstruction import FactReport, FactVerdict, ScanVerdict
 from tests.command_line import scanweld as command
 from tests.html_pages import Page

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
-from scanweld.kernels import provide_cache
+from scanweld.work.kernels import provide_cache
 
 # Numba tries a folder by a temporary file in it; here all but our own are read-only.
 READ_ONLY = """

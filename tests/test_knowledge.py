@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scanweld import pipeline
 from scanweld.app.outputs import report_json
 from scanweld.app.summary import summary
 from scanweld.config import Config, FusionConfig, PairsConfig, PrepareConfig
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet
-from scanweld.knowledge import Knowledge
-from scanweld.progress import Cache
+from scanweld.knowledge.facts import Knowledge
+from scanweld.pipeline import run as pipeline
 from scanweld.reconstruction import FactVerdict, Reconstruction, Verdict
+from scanweld.work.progress import Cache
 from tests.scenes import MILD_NOISE, Scene, scene_of, small_creature, view_of
 
 CONFIG = Config(

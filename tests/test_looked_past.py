@@ -8,13 +8,13 @@ import pytest
 from scanweld.evaluation.primitives import lathe
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.patches import MIN_PAST_PIXELS, Told, is_looked_past, told_of
+from scanweld.evidence.pixels import PAST_PIXELS, see
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.multiview.merge import propose_merges
-from scanweld.pairs.field import ScanField
-from scanweld.pairs.pixels import PAST_PIXELS, see
+from scanweld.graph.merge import propose_merges
 from scanweld.pairs.result import Alternative, PairKind
-from scanweld.pairs.told import MIN_PAST_PIXELS, Told, is_looked_past, told_of
 from tests.prepared import PreparedPair, creature_pair, prepared_pair
 from tests.scenes import scene_of
 from tests.view_graphs import pair_of, seen

@@ -12,18 +12,18 @@ from scipy.spatial import KDTree
 from scanweld.config import ContoursConfig, PrepareConfig
 from scanweld.contours.coherence import ContourPair, contour_pair
 from scanweld.contours.contour_sets import observe_contours
-from scanweld.contours.joint_solve import Pulls, cost_of, levenberg_marquardt
-from scanweld.contours.links import LinkMatches, match_mutual, match_trimmed, render_links
-from scanweld.contours.m_icc import m_icc
-from scanweld.contours.mm_icc import mm_icc
-from scanweld.contours.outer_loop import ContourAlignment
-from scanweld.contours.residuals import image_pulls, point_pulls
 from scanweld.evaluation.views import ring_of_views
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
+from scanweld.published.contour_links import LinkMatches, match_mutual, match_trimmed, render_links
+from scanweld.published.joint_solve import Pulls, cost_of, levenberg_marquardt
+from scanweld.published.m_icc import m_icc
+from scanweld.published.mm_icc import mm_icc
+from scanweld.published.outer_loop import ContourAlignment
+from scanweld.published.residuals import image_pulls, point_pulls
 from tests.prepared import creature_pair, scaled
 from tests.scenes import scene_of, small_creature
 

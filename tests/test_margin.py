@@ -6,15 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanweld.config import PairsConfig
+from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.rivals import as_rival
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.result import (
-    Alternative,
-    Evidence,
-    PairKind,
-    as_rival,
-    margin_among,
-    refutation_among,
-)
+from scanweld.pairs.result import Alternative, PairKind, margin_among, refutation_among
 from scanweld.pairs.verdict import classify_pair
 from tests.results import turned
 

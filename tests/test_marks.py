@@ -10,18 +10,18 @@ from scanweld.config import GraphConfig, PairsConfig
 from scanweld.evaluation.primitives import lathe
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.patches import Told, is_refuted_jointly, told_of
+from scanweld.evidence.pixels import see
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.multiview.explain import doubt_alone, find_doubts
-from scanweld.multiview.merge import Merge, Poses, propose_merges
-from scanweld.multiview.view_graph import Component, ViewGraph
+from scanweld.graph.merge import Merge, Poses, propose_merges
+from scanweld.graph.reasons import doubt_alone, find_doubts
+from scanweld.graph.view_graph import Component, ViewGraph
 from scanweld.pairs.alternatives import alternative_at
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.marks import Decided, decide
-from scanweld.pairs.pixels import see
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import Alternative, PairKind, PairResult
-from scanweld.pairs.told import Told, is_refuted_jointly, told_of
 from scanweld.pairs.turning import STEP_DEG, turn_to_mark
 from tests.prepared import PreparedPair, prepared_pair
 from tests.scenes import scene_of

@@ -26,8 +26,8 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io import write_scan_ply
-from scanweld.prepare import prepare
-from scanweld.prepare.thinning import thinned
+from scanweld.preparation import prepare
+from scanweld.preparation.thinning import thinned
 from tests.prepared import moved
 from tests.scenes import creature_scene, random_motion
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.surface.surface_defects import surface_defects
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
-from scanweld.evaluation.surface_defects import surface_defects
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
 from scanweld.fusion.color import exposure_gains
@@ -25,7 +25,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_mesh, write_mesh_ply
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 RADIUS = 50.0
 SIDES = [(0, 0), (90, 0), (180, 0), (270, 0), (0, 89), (0, -89)]

@@ -8,6 +8,9 @@ import pytest
 from scanweld.config import HeatConfig, PairsConfig
 from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.icp import IcpSchedule, icp
+from scanweld.evidence.information import information_of
+from scanweld.evidence.visibility import pose_rows
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
@@ -16,11 +19,8 @@ from scanweld.pairs.alternatives import to_pose
 from scanweld.pairs.anchors import even_anchors, pair_anchors
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
-from scanweld.pairs.icp import IcpSchedule, icp
-from scanweld.pairs.information import information_of
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
-from scanweld.pairs.visibility import pose_rows
 from tests.prepared import PreparedPair, creature_pair, pair_of_scene, prepared_pair
 from tests.scenes import primitive_scene, scene_of
 

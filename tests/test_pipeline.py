@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scanweld import pipeline, steps
 from scanweld.config import Config, FusionConfig, HeatConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.metrics import (
@@ -21,8 +20,11 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet
 from scanweld.pairs.result import PairResult
-from scanweld.progress import Cache
+from scanweld.pipeline import robust
+from scanweld.pipeline import run as pipeline
+from scanweld.pipeline import stages as steps
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+from scanweld.work.progress import Cache
 from tests.prepared import scaled
 from tests.scenes import MILD_NOISE, Scene, creature_scene, primitive_scene
 
@@ -157,13 +159,13 @@ class Memory:
 
 def test_a_second_run_recomputes_nothing(monkeypatch: pytest.MonkeyPatch):
     scans, memory, calls = few(), Memory(), []
-    register = pipeline.register_pair
+    register = robust.register_pair
 
     def counted(*arguments: Any) -> PairResult:
         calls.append(arguments[:2])
         return register(*arguments)
 
-    monkeypatch.setattr(pipeline, "register_pair", counted)
+    monkeypatch.setattr(robust, "register_pair", counted)
     first = run(scans, cache=memory)
     assert len(calls) == 6 and memory.num_put >= 6
     kept = memory.num_put

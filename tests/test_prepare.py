@@ -17,8 +17,8 @@ from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
 from scanweld.geometry.scan import RangeScan, Viewpoint
-from scanweld.prepare import prepare
-from scanweld.prepare.sampling import farthest_points
+from scanweld.preparation import prepare
+from scanweld.preparation.sampling import farthest_points
 from tests.depth_scans import (
     CONFIG,
     MODELS,

@@ -17,7 +17,7 @@ from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import write_scan_ply
-from scanweld.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
 from tests.command_line import scanweld as command
 from tests.scenes import creature_scene, scene_of
 

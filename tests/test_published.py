@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from scanweld import pipeline
 from scanweld.app.outputs import report_json
 from scanweld.app.summary import summary
 from scanweld.config import CoarseConfig, Config
 from scanweld.evaluation.metrics import Standing
 from scanweld.geometry.scan import RangeScan
 from scanweld.pairs.result import PairKind
-from scanweld.progress import Cache
+from scanweld.pipeline import run as pipeline
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
+from scanweld.work.progress import Cache
 from tests.scenes import MILD_NOISE, Scene, creature_scene, primitive_scene
 from tests.test_pipeline import CONFIG, Memory, assert_sound, errors_of
 

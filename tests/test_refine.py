@@ -8,15 +8,16 @@ import pytest
 
 from scanweld.config import ContoursConfig, PrepareConfig, RefineConfig
 from scanweld.contours.coherence import contour_matcher
+from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.multiview.refine import Refinement, refine_poses, scan_rms
-from scanweld.multiview.refine_graph import Refined, refine_graph
-from scanweld.multiview.surface_terms import surface_matches, surface_source
-from scanweld.multiview.view_graph import Component, ViewGraph
-from scanweld.pairs.result import Alternative, Evidence
-from scanweld.prepare import prepare
+from scanweld.graph.refine_graph import Refined, refine_graph
+from scanweld.graph.view_graph import Component, ViewGraph
+from scanweld.pairs.result import Alternative
+from scanweld.preparation import prepare
+from scanweld.refinement.refine import Refinement, refine_poses, scan_rms
+from scanweld.refinement.surface_terms import surface_matches, surface_source
 from tests.prepared import scaled
 from tests.scenes import creature_scene
 

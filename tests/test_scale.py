@@ -9,9 +9,9 @@ from scanweld.config import PrepareConfig, RefineConfig
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.multiview.refine import refine_poses
-from scanweld.multiview.scale import ScaleEstimate, estimate_scales
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
+from scanweld.refinement.refine import refine_poses
+from scanweld.refinement.scale import ScaleEstimate, estimate_scales
 from tests.prepared import scaled
 from tests.scenes import creature_scene
 

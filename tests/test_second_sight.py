@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from scanweld.config import GraphConfig
+from scanweld.evidence.edges import judge_off_edges, with_wide_edges
+from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
+from scanweld.evidence.visibility import judge, mean_evidence
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind
-from scanweld.multiview.assemble import build_view_graph
-from scanweld.multiview.merge import Judge, Merge, Support, not_only_by
-from scanweld.multiview.view_graph import ViewGraph
-from scanweld.pairs.edges import judge_off_edges, with_wide_edges
-from scanweld.pairs.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
-from scanweld.pairs.result import Evidence, PairKind
-from scanweld.pairs.visibility import judge, mean_evidence
+from scanweld.graph.assemble import build_view_graph
+from scanweld.graph.merge import Judge, Merge, Support, not_only_by
+from scanweld.graph.view_graph import ViewGraph
+from scanweld.pairs.result import PairKind
 from tests.prepared import creature_pair
 from tests.view_graphs import (
     CENTRE,

@@ -13,8 +13,8 @@ from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
 from scanweld.io import read_scan
-from scanweld.prepare.resolution import point_spacing
-from scanweld.prepare.sensor import locate_sensor
+from scanweld.preparation.resolution import point_spacing
+from scanweld.preparation.sensor import locate_sensor
 from tests.data import require_data
 
 PINHOLE = Camera(

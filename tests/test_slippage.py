@@ -10,14 +10,14 @@ from scanweld.config import PairsConfig
 from scanweld.evaluation.primitives import cylinder, lathe, plate, sphere
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.information import TURN_SCALE, information_of
+from scanweld.evidence.slippage import Slide, Slippage, slide_words, slippage_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.pairs.anchors import even_anchors
-from scanweld.pairs.information import TURN_SCALE, information_of
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind
-from scanweld.pairs.slippage import Slide, Slippage, slide_words, slippage_of
 from tests.prepared import PreparedPair, pair_of_scene
 from tests.scenes import random_motion, scene_of, small_creature
 

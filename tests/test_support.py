@@ -9,12 +9,12 @@ from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
-from scanweld.intake import Intake, take_in
-from scanweld.knowledge import Knowledge
-from scanweld.prepare import prepare, stands_on_support
-from scanweld.prepare.support import find_support
-from scanweld.progress import NoCache, silent
-from scanweld.stages import Stages
+from scanweld.knowledge.facts import Knowledge
+from scanweld.pipeline.intake import Intake, take_in
+from scanweld.preparation import prepare, stands_on_support
+from scanweld.preparation.support import find_support
+from scanweld.work.progress import NoCache, silent
+from scanweld.work.stage_log import Stages
 from tests.scenes import small_creature
 
 NOISE = NoiseModel(depth_diameters=2e-4)

@@ -10,22 +10,15 @@ import pytest
 from scanweld.config import PairsConfig
 from scanweld.evaluation.primitives import lathe
 from scanweld.evaluation.views import view_of
+from scanweld.evidence.evidence import VIOLATION_WEIGHT, Evidence
+from scanweld.evidence.slippage import Slide, Slippage
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.multiview.explain import why_open
-from scanweld.multiview.view_graph import ViewGraph
+from scanweld.graph.reasons import why_open
+from scanweld.graph.view_graph import ViewGraph
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.register import register_pair
-from scanweld.pairs.result import (
-    VIOLATION_WEIGHT,
-    Alternative,
-    Evidence,
-    PairKind,
-    PairResult,
-    near_best,
-    weights_of,
-)
-from scanweld.pairs.slippage import Slide, Slippage
+from scanweld.pairs.result import Alternative, PairKind, PairResult, near_best, weights_of
 from scanweld.pairs.symmetry import Likeness, Symmetry, symmetry_of
 from tests.prepared import pair_of_scene
 from tests.scenes import MILD_NOISE, random_motion, scene_of

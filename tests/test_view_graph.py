@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanweld.geometry.pose import Pose
-from scanweld.multiview.view_graph import Edge, ViewGraph
+from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 from tests.view_graphs import (
     DIAGONAL,

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from scanweld.config import GraphConfig
+from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.pose import Pose, random_rotation
-from scanweld.multiview.assemble import build_view_graph
-from scanweld.multiview.explain import find_doubts
-from scanweld.multiview.merge import Judge
-from scanweld.multiview.view_graph import Component, Edge, ViewGraph
-from scanweld.pairs.result import Alternative, Evidence, PairKind, PairResult
+from scanweld.graph.assemble import build_view_graph
+from scanweld.graph.merge import Judge
+from scanweld.graph.reasons import find_doubts
+from scanweld.graph.view_graph import Component, Edge, ViewGraph
+from scanweld.pairs.result import Alternative, PairKind, PairResult
 
 CENTRE = np.array([0.0, 0.0, 3.0])
 SAME_DEG, SAME_SHIFT = 2.5, 0.03

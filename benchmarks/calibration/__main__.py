@@ -21,7 +21,7 @@ from benchmarks.calibration.learn import learn
 from benchmarks.calibration.page import calibration
 from benchmarks.calibration.report import measures, write_all
 from benchmarks.paper.study import Study
-from scanweld.parallel import num_workers
+from scanweld.work.threads import num_workers
 
 ROOT = Path(__file__).parents[2]
 

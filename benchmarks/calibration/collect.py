@@ -15,7 +15,7 @@ from benchmarks.virtual.scene import Scene
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
 from scanweld.geometry.pose import Pose
-from scanweld.pipeline import run
+from scanweld.pipeline.run import run
 from scanweld.reconstruction import PairReport, Reconstruction
 
 CODE = (

@@ -16,7 +16,7 @@ from scanweld.confidence.links import links
 from scanweld.confidence.model import Calibration
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
-from scanweld.multiview.view_graph import Component
+from scanweld.graph.view_graph import Component
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.verdict import no_pose
 

@@ -20,11 +20,15 @@ from benchmarks.paper.success import auc
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import make_scene
 from scanweld.geometry.pose import Pose
-from scanweld.parallel import single_threaded_algebra
-from scanweld.prepare.prepare import prepare
+from scanweld.preparation.prepare import prepare
+from scanweld.work.threads import single_threaded_algebra
 
 CODE = (
-    *("src/scanweld/geometry/*.py", "src/scanweld/prepare/*.py", "src/scanweld/evaluation/*.py"),
+    *(
+        "src/scanweld/geometry/*.py",
+        "src/scanweld/preparation/*.py",
+        "src/scanweld/evaluation/*.py",
+    ),
     *("benchmarks/virtual/*.py", "benchmarks/judging/rivals.py"),
     "benchmarks/paper/baselines/*.py",
 )

@@ -23,7 +23,7 @@ from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet
 from scanweld.pairs.result import PairKind
-from scanweld.pipeline import run
+from scanweld.pipeline.run import run
 from scanweld.reconstruction import PairReport, Reconstruction, ScanReport, ScanVerdict
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=100))

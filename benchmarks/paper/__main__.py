@@ -28,7 +28,7 @@ from benchmarks.paper.pages import write_index, write_page
 from benchmarks.paper.study import Study, Table, read_records
 from benchmarks.paper.tables import table, table_names
 from scanweld.errors import InputError, ScanweldError
-from scanweld.parallel import num_workers
+from scanweld.work.threads import num_workers
 
 USAGE_ERROR = 2
 

@@ -17,7 +17,7 @@ from benchmarks.paper.views import VirtualScan, disturbed, mesh_of, pose_error, 
 from scanweld.config import Config
 from scanweld.contours.coherence import contour_matcher
 from scanweld.geometry.pose import Pose
-from scanweld.multiview.refine import refine_poses
+from scanweld.refinement.refine import refine_poses
 
 NAME = "basins"
 TITLE = "Basins of convergence"

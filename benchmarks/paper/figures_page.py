@@ -127,10 +127,10 @@ def _draw_coarse(records: Sequence[Record], out: Path) -> str:
         "fig4-coarse.png",
         f"""Two views of the {name}, {gap:.0f}° apart (overlap {percent(record.result["overlap"])}).
         (a) Both in their own camera frames, where the paper starts. (b) M-ICC from there
-        (`contours/m_icc.py`). (c) The coarse step as published: matched PA-HKS keypoints, then ICP
-        (`pairs/coarse.py`). (d) The default (`pairs/register.py`), which takes no start. Below: a
-        level cut through the scans, over that through the mesh (grey). Errors of rotation, and of
-        the middle of the moved scan in % of *D*: {told}. [Table 1](table1.md) has all gaps and view
+        (`published/m_icc.py`). (c) The coarse step as published: matched PA-HKS keypoints, then ICP
+        (`published/coarse.py`). (d) The default (`pairs/register.py`), which takes no start.
+        Below: a level cut through the scans, over that through the mesh (grey). Errors of rotation,
+        and of the middle of the moved scan in % of *D*: {told}. [Table 1](table1.md) has all gaps and view
         directions.""",
     )
 
@@ -192,9 +192,9 @@ def _draw_four_views(records: Sequence[Record], out: Path) -> str:
         f"""Four views of the {setting.name} at {azimuths} (setting ({setting.numeral}) of
         [Table 2](table2.md)). (a) All in their own camera frames. (b) Their heat at a middle time,
         and their {keypoints} keypoints (`heat/features.py`). The other panels lay the pairs of
-        adjacent views in a chain: pairs by the paper's coarse step (`pairs/coarse.py`); by the
+        adjacent views in a chain: pairs by the paper's coarse step (`published/coarse.py`); by the
         default (`pairs/register.py`); and the latter after the joint refinement of all poses
-        (`multiview/refine.py`), seen from the other side. RMS distance of true correspondences:
+        (`refinement/refine.py`), seen from the other side. RMS distance of true correspondences:
         {told}.""",
     )
 
@@ -240,7 +240,7 @@ def _draw_gallery(records: Sequence[Record], out: Path) -> str:
             f"Figure 6{letter}: M-ICC and MM-ICC, {name}",
             file,
             f"""The settings of [Table 2](table2.md) with the {name}, tuned as there: M-ICC
-            (`contours/m_icc.py`) and MM-ICC as published (`contours/mm_icc.py`) from the same
+            (`published/m_icc.py`) and MM-ICC as published (`published/mm_icc.py`) from the same
             starts, all views but the first {starts} off the truth. Shown is the start of the first
             seed. Below: RMS distance of its true correspondences, and how many of
             {own[0].unit["seeds"]} seeds come out right.""",

@@ -15,8 +15,8 @@ from benchmarks.paper.study import Record
 from benchmarks.paper.success import Limit, auc
 from benchmarks.paper.table2 import SWEEP_DEG
 from scanweld.config import Config
+from scanweld.evidence.evidence import Evidence
 from scanweld.pairs.alternatives import schedules
-from scanweld.pairs.result import Evidence
 
 Answer = dict[str, Any]
 """A record of benchmarks/pairs.py."""

@@ -22,7 +22,7 @@ from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_poses, read_scan
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 NAME = "real_pairs"
 TITLE = "Pairs of real scans"

@@ -16,7 +16,7 @@ from benchmarks.paper.trial import missing_modules, need_all, try_methods, witho
 from benchmarks.paper.views import VirtualScan, mesh_of, overlap_of, start_pose, virtual_scan
 from scanweld.config import CoarseConfig, HeatConfig
 from scanweld.heat.features import Features, describe
-from scanweld.heat.matching import match_signatures
+from scanweld.published.signature_matching import match_signatures
 
 NAME = "table1"
 TITLE = "Table 1: two views, any angle apart"

@@ -29,13 +29,13 @@ from benchmarks.paper.table2_page import tell
 from benchmarks.paper.views import VirtualScan, mesh_of, pose_error
 from scanweld.config import Config, ContoursConfig, FusionConfig
 from scanweld.contours.coherence import contour_matcher
-from scanweld.contours.m_icc import m_icc
-from scanweld.contours.mm_icc import mm_icc
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import describe
-from scanweld.multiview.refine import refine_poses
-from scanweld.pairs.coarse import register_as_published
-from scanweld.pipeline import run
+from scanweld.pipeline.run import run
+from scanweld.published.coarse import register_as_published
+from scanweld.published.m_icc import m_icc
+from scanweld.published.mm_icc import mm_icc
+from scanweld.refinement.refine import refine_poses
 
 NAME = "table2"
 TITLE = "Table 2: refinement in seven settings"

@@ -18,7 +18,7 @@ from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import principal_diameter
 from scanweld.io import read_mesh
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 Start = Literal["identity", "random"]
 

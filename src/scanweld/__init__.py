@@ -3,7 +3,11 @@
 In short: ``scanweld.run(scanweld.read_scans("scans/"))``.
 """
 
-from scanweld import kernels as kernels  # first: makes room for the kernels of the others
+from scanweld.work import (
+    kernels as kernels,  # first: it says where the kernels of the others are kept
+)
+
+# isort: split
 from scanweld.config import Config, load_config
 from scanweld.errors import (
     ConfigError,
@@ -14,6 +18,7 @@ from scanweld.errors import (
     WriteError,
 )
 from scanweld.evaluation.metrics import evaluate_poses
+from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
@@ -28,10 +33,9 @@ from scanweld.io import (
     write_scan_ply,
 )
 from scanweld.io.scans import read_scans
-from scanweld.knowledge import Knowledge, read_knowledge
-from scanweld.pairs.result import Evidence, PairKind
-from scanweld.pipeline import run
-from scanweld.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+from scanweld.knowledge.facts import Knowledge, read_knowledge
+from scanweld.pairs.result import PairKind
+from scanweld.pipeline.run import run
 from scanweld.reconstruction import (
     FactReport,
     FactVerdict,
@@ -41,6 +45,7 @@ from scanweld.reconstruction import (
     ScanVerdict,
     Verdict,
 )
+from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
 
 __all__ = [
     "Camera",

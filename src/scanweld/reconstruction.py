@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from scanweld.config import Config
+from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.slippage import Slide
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import Viewpoint
-from scanweld.pairs.result import Evidence, PairKind
-from scanweld.pairs.slippage import Slide
+from scanweld.pairs.result import PairKind
+from scanweld.work.stage_log import StageReport
 
 
 class Verdict(StrEnum):
@@ -159,21 +161,6 @@ class FactReport:
     fact: str
     verdict: FactVerdict
     reason: str
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class StageReport:
-    """Time and memory of a stage, and what it counted.
-
-    Attributes:
-        seconds: Wall time.
-        peak_mb: Peak resident memory of the process at the stage's end.
-        counts: What was counted, such as {"pairs": 45, "accepted": 25}.
-    """
-
-    seconds: float
-    peak_mb: float
-    counts: Mapping[str, int | float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from benchmarks.paper.success import Limit, cell
 from benchmarks.paper.views import mesh_of, pose_error, virtual_scan
 from scanweld.config import CoarseConfig, HeatConfig
 from scanweld.heat.features import describe
-from scanweld.pairs.coarse import register_as_published
+from scanweld.published.coarse import register_as_published
 
 OBJECTS = ("armadillo", "bunny")
 GAPS = (10, 30, 50, 70, 90)

@@ -14,8 +14,8 @@ from benchmarks.paper.views import VirtualScan, disturbed, mesh_of, pose_error, 
 from scanweld.config import ContoursConfig
 from scanweld.contours.coherence import contour_pair
 from scanweld.contours.contour_sets import observe_contours
-from scanweld.contours.mm_icc import mm_icc
 from scanweld.geometry.pose import Pose
+from scanweld.published.mm_icc import mm_icc
 
 OBJECTS = ("armadillo", "bunny")
 GAPS = (30, 60, 90)

@@ -13,7 +13,7 @@ from benchmarks.paper.study import Record, Result, Unit
 from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan
 from scanweld.config import HeatConfig
 from scanweld.heat.features import Features, describe
-from scanweld.heat.matching import match_signatures
+from scanweld.published.signature_matching import match_signatures
 
 OBJECTS = ("armadillo", "bunny")
 AZIMUTHS = (0, 90, 180, 270)

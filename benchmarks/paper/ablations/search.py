@@ -22,19 +22,15 @@ from scanweld.evaluation.metrics import (
     MAX_TRANSLATION_PERCENT,
     object_diameter,
 )
+from scanweld.evidence.evidence import CONTRADICT_WEIGHT, FREE_WEIGHT, VIOLATION_WEIGHT
+from scanweld.evidence.field import make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
 from scanweld.io import read_poses, read_scan
-from scanweld.pairs.field import make_field
-from scanweld.pairs.result import (
-    CONTRADICT_WEIGHT,
-    FREE_WEIGHT,
-    VIOLATION_WEIGHT,
-    PairResult,
-)
-from scanweld.pipeline import pair_registrar
-from scanweld.prepare import prepare
+from scanweld.pairs.result import PairResult
+from scanweld.pipeline.robust import pair_registrar
+from scanweld.preparation import prepare
 
 OBJECTS = ("armadillo", "bunny")
 GAPS = (90, 100, 110, 120)

@@ -10,9 +10,9 @@ from benchmarks.paper.study import Record, Result, Unit
 from benchmarks.paper.views import disturbed, mesh_of, overlap_of, pose_error, virtual_scan
 from scanweld.config import ContoursConfig, RefineConfig
 from scanweld.contours.coherence import contour_matcher
-from scanweld.contours.mm_icc import mm_icc
 from scanweld.geometry.pose import Pose
-from scanweld.multiview.refine import refine_poses
+from scanweld.published.mm_icc import mm_icc
+from scanweld.refinement.refine import refine_poses
 
 OBJECTS = ("armadillo", "bunny")
 GAPS = (60, 90, 110, 120)

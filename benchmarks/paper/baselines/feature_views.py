@@ -8,19 +8,19 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
-from benchmarks.paper.baselines.fpfh import FEATURE_VOXELS, VOXEL
-from benchmarks.paper.optional import need
-from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan
-from scanweld.config import HeatConfig
-from scanweld.evaluation.full_mesh_hks import (
+from benchmarks.features.full_mesh_hks import (
     full_mesh_hks,
     full_mesh_keypoints,
     full_mesh_spectrum,
 )
-from scanweld.evaluation.harris3d import harris_keypoints
-from scanweld.evaluation.si_hks import octave_times, si_heat_signature
-from scanweld.evaluation.spectrum import Spectrum, spectrum_of, values_at
-from scanweld.evaluation.wks import energy_bands, wave_distances, wave_signature
+from benchmarks.features.harris3d import harris_keypoints
+from benchmarks.features.si_hks import octave_times, si_heat_signature
+from benchmarks.features.spectrum import Spectrum, spectrum_of, values_at
+from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
+from benchmarks.paper.baselines.fpfh import FEATURE_VOXELS, VOXEL
+from benchmarks.paper.optional import need
+from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan
+from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import principal_diameter

@@ -5,18 +5,18 @@ from collections.abc import Callable, Mapping, Sequence
 from benchmarks.paper.baselines.records import Answer, ScanPair, closeness
 from scanweld.config import Config, ContoursConfig
 from scanweld.contours.coherence import contour_matcher
-from scanweld.contours.m_icc import m_icc as align_by_m_icc
-from scanweld.contours.mm_icc import mm_icc as align_by_mm_icc
-from scanweld.contours.outer_loop import ContourAlignment
+from scanweld.evidence.field import make_field
 from scanweld.geometry.point_fit import FRACTION_EXPONENT, Trim
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
-from scanweld.pairs.coarse import register_as_published
-from scanweld.pairs.field import make_field
-from scanweld.pairs.point_icp import point_icp
 from scanweld.pairs.result import PairKind
-from scanweld.pipeline import pair_registrar
+from scanweld.pipeline.robust import pair_registrar
+from scanweld.published.coarse import register_as_published
+from scanweld.published.m_icc import m_icc as align_by_m_icc
+from scanweld.published.mm_icc import mm_icc as align_by_mm_icc
+from scanweld.published.outer_loop import ContourAlignment
+from scanweld.published.point_icp import point_icp
 
 Edges = Sequence[tuple[int, int]]
 Align = Callable[

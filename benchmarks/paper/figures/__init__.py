@@ -19,8 +19,6 @@ from benchmarks.paper.views import VirtualScan, overlap_of, pose_error, virtual_
 from scanweld.config import Config, ContoursConfig
 from scanweld.contours.coherence import ContourPair, coherence, contour_matcher
 from scanweld.contours.contour_sets import observe_contours
-from scanweld.contours.m_icc import m_icc
-from scanweld.contours.mm_icc import mm_icc
 from scanweld.contours.predict import predict_contours
 from scanweld.contours.prune import (
     prune_invisible_observed,
@@ -28,7 +26,9 @@ from scanweld.contours.prune import (
     prune_self_occlusion,
 )
 from scanweld.geometry.pose import Pose
-from scanweld.multiview.refine import refine_poses
+from scanweld.published.m_icc import m_icc
+from scanweld.published.mm_icc import mm_icc
+from scanweld.refinement.refine import refine_poses
 
 NAME = "figures"
 TITLE = "Figures 1 to 6: what happens on the way"

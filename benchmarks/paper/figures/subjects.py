@@ -7,7 +7,7 @@ from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.io import read_scan
-from scanweld.prepare import prepare
+from scanweld.preparation import prepare
 
 
 @lru_cache

@@ -52,7 +52,7 @@ from scanweld.evaluation.simulate import TYPICAL_NOISE
 from scanweld.evaluation.simulate import simulate as make_scans
 from scanweld.geometry.camera import CameraModel
 from scanweld.io import collect, read_mesh, read_poses, read_scan
-from scanweld.knowledge import Knowledge, read_knowledge
+from scanweld.knowledge.facts import Knowledge, read_knowledge
 
 ERROR = 1
 USAGE = 2

@@ -19,7 +19,7 @@ from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
 from scanweld.io.pose_formats.records import printed
-from scanweld.prepare.sensor import locate_sensor
+from scanweld.preparation.sensor import locate_sensor
 
 MODEL_FORMATS = ("ply", "obj", "stl", "glb")
 NO_COLOR = 128

@@ -11,16 +11,16 @@ from scanweld.config import Config
 from scanweld.fusion import fuse
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.intake import Intake, take_in
 from scanweld.io import collect, natural_key
 from scanweld.io.pose_formats import Frame, PoseEntries, match_poses, read_any_poses
 from scanweld.io.pose_formats.records import require_pinhole
-from scanweld.knowledge import Knowledge
-from scanweld.outcome import prepared_report, unplaced_report
-from scanweld.parallel import num_workers, single_threaded_algebra
-from scanweld.progress import NoCache, Progress, ScanRefused, silent, telling
+from scanweld.knowledge.facts import Knowledge
+from scanweld.pipeline.conclude import prepared_report, unplaced_report
+from scanweld.pipeline.intake import Intake, take_in
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
-from scanweld.stages import Stages
+from scanweld.work.progress import NoCache, Progress, ScanRefused, silent, telling
+from scanweld.work.stage_log import Stages
+from scanweld.work.threads import num_workers, single_threaded_algebra
 
 
 def fuse_job(

@@ -2,8 +2,8 @@
 
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.scan import RangeScan, principal_diameter
-from scanweld.prepare.resolution import point_spacing
-from scanweld.prepare.sensor import locate_sensor
+from scanweld.preparation.resolution import point_spacing
+from scanweld.preparation.sensor import locate_sensor
 
 
 def describe_scan(scan: RangeScan) -> str:

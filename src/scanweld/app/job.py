@@ -5,7 +5,6 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from scanweld import pipeline
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
@@ -15,12 +14,13 @@ from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, collect, printable, read_scan
-from scanweld.knowledge import Knowledge
-from scanweld.parallel import num_workers
-from scanweld.prepare.thinning import thinned
-from scanweld.progress import Progress, ScanRefused, StageAdvanced, silent, telling
+from scanweld.knowledge.facts import Knowledge
+from scanweld.pipeline import run as pipeline
+from scanweld.preparation.thinning import thinned
 from scanweld.reconstruction import Reconstruction
-from scanweld.stages import peak_memory_mb
+from scanweld.work.progress import Progress, ScanRefused, StageAdvanced, silent, telling
+from scanweld.work.stage_log import peak_memory_mb
+from scanweld.work.threads import num_workers
 
 logger = logging.getLogger(__name__)
 

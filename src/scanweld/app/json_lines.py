@@ -4,8 +4,8 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from scanweld.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
 from scanweld.reconstruction import Reconstruction
+from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
 
 EVENTS: dict[type[Event], str] = {
     StageStarted: "stage_started",

@@ -7,8 +7,9 @@ from typing import Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from scanweld.errors import ReadError
+from scanweld.evidence.evidence import Evidence
 from scanweld.io.poses import load_json, read_text
-from scanweld.pairs.result import Evidence, PairKind
+from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import FactReport, ScanVerdict, Verdict
 
 

@@ -12,7 +12,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
 from scanweld.io.pose_formats.records import printed
-from scanweld.prepare.thinning import thinned
+from scanweld.preparation.thinning import thinned
 from scanweld.reconstruction import ScanVerdict
 
 

@@ -8,7 +8,8 @@ from typing import Any
 from scanweld.app.json_text import json_text
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, natural_key, write_mesh_ply, write_poses, write_whole
-from scanweld.reconstruction import PairReport, Reconstruction, StageReport
+from scanweld.reconstruction import PairReport, Reconstruction
+from scanweld.work.stage_log import StageReport
 
 FORMAT = 1
 

@@ -13,7 +13,7 @@ from rich.progress import Progress as Bars
 from rich.text import Text
 
 from scanweld.app.json_lines import event_line
-from scanweld.progress import (
+from scanweld.work.progress import (
     Event,
     Progress,
     ScanRefused,

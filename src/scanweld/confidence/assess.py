@@ -16,7 +16,7 @@ from scanweld.confidence.links import links
 from scanweld.confidence.model import Calibration
 from scanweld.confidence.witnesses import Witnesses
 from scanweld.config import Config
-from scanweld.multiview.view_graph import Edge, ViewGraph
+from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 
 OPEN = 0.49

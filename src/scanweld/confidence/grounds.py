@@ -9,7 +9,8 @@ import numpy as np
 
 from scanweld.confidence.joint_evidence import JointEvidence
 from scanweld.confidence.witnesses import Looks
-from scanweld.pairs.result import Alternative, Evidence, PairResult, margin_among, refutation_among
+from scanweld.evidence.evidence import Evidence
+from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
 
 Grounds = Mapping[str, float]
 

@@ -8,19 +8,19 @@ import numpy as np
 
 from scanweld.confidence.misfit import misfit, two_way_offsets
 from scanweld.confidence.witnesses import Looks, Witnesses, over
-from scanweld.geometry.pose import Pose
-from scanweld.multiview.merge import Merge, Poses, is_near, propose_merges
-from scanweld.multiview.view_graph import Component, Edge, ViewGraph
-from scanweld.pairs.information import information_from, observability_of, two_way_matches
-from scanweld.pairs.register import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
-from scanweld.pairs.result import (
-    MIN_AGREE,
+from scanweld.evidence.evidence import MIN_AGREE, Evidence
+from scanweld.evidence.information import information_from, observability_of, two_way_matches
+from scanweld.evidence.rivals import (
     MIN_TOLD_SHARE,
-    Evidence,
+    RIVAL_ANGLE_DEG,
+    RIVAL_SHIFT_DIAMETERS,
     as_rival,
     margin_over,
     refutation,
 )
+from scanweld.geometry.pose import Pose
+from scanweld.graph.merge import Merge, Poses, is_near, propose_merges
+from scanweld.graph.view_graph import Component, Edge, ViewGraph
 
 MIN_CONDUCTANCE = 0.02
 """Accepted pairs conduct by their score, and none less than this."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_flow
 
-from scanweld.multiview.view_graph import Component, Edge
+from scanweld.graph.view_graph import Component, Edge
 
 STEPS = 1000
 """Flows are counted in this part of a unit: whole numbers give the same answer anywhere."""

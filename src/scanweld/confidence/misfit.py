@@ -10,7 +10,7 @@ import numpy as np
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
-from scanweld.multiview.surface_terms import SurfaceSource, surface_matches
+from scanweld.refinement.surface_terms import SurfaceSource, surface_matches
 
 PATCH_DIAMETERS = 0.06
 """Edge of the cells over which residuals are averaged."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from scanweld.confidence.misfit import pair_misfit
 from scanweld.config import Config
 from scanweld.contours.coherence import contour_coherence
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.information import information_of, observability_of
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.multiview.merge import Judge
-from scanweld.multiview.surface_terms import SurfaceSource, surface_source
-from scanweld.pairs.field import ScanField
-from scanweld.pairs.information import information_of, observability_of
+from scanweld.graph.merge import Judge
+from scanweld.refinement.surface_terms import SurfaceSource, surface_source
 
 NUM_POINTS = 2000
 """Surface points of a scan by which misfit is measured."""

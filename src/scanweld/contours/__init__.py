@@ -1,1 +1,1 @@
-"""Contour coherence: M-ICC and MM-ICC (paper 3.2)."""
+"""Contour sets of two views, their prunings and coherence (paper 3.2)."""

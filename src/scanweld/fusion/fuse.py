@@ -27,8 +27,8 @@ from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.parallel import map_in_order
-from scanweld.prepare.range_image import natural_pixel
+from scanweld.preparation.range_image import natural_pixel
+from scanweld.work.threads import map_in_order
 
 logger = logging.getLogger(__name__)
 

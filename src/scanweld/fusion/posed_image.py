@@ -13,8 +13,8 @@ from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
-from scanweld.prepare.prepare import surface_points
-from scanweld.prepare.range_image import normals_image, render_surface, rim_pixels
+from scanweld.preparation.prepare import surface_points
+from scanweld.preparation.range_image import normals_image, render_surface, rim_pixels
 
 logger = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from scanweld.errors import InputError
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import plane_distance, project, smooth_distance
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-from scanweld.parallel import map_in_order
+from scanweld.work.threads import map_in_order
 
 BLOCK = 8
 """Voxels along the edge of a block."""

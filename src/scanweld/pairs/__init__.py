@@ -1,1 +1,1 @@
-"""Two scans -> judged relative poses."""
+"""Two scans to judged relative poses: the search, and the verdict."""

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.icp import IcpSchedule, icp
+from scanweld.evidence.visibility import judge, mean_evidence, pose_rows
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, nearest_rotation
-from scanweld.pairs.field import ScanField
-from scanweld.pairs.icp import IcpSchedule, icp
 from scanweld.pairs.result import Alternative
-from scanweld.pairs.visibility import judge, mean_evidence, pose_rows
 
 NUM_COARSE_SAMPLES = 200
 """Samples of a scan that take part while many poses are looked at roughly,"""

@@ -3,8 +3,8 @@
 import numpy as np
 
 from scanweld.config import PairsConfig
+from scanweld.evidence.field import ScanField
 from scanweld.heat.features import Features
-from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors
 
 MIN_KEYPOINTS = 12

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from scanweld.evidence.icp import MIN_MATCHES
+from scanweld.evidence.information import TURN_SCALE
+from scanweld.evidence.slippage import free_motions
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.pairs.icp import MIN_MATCHES
-from scanweld.pairs.information import TURN_SCALE
 from scanweld.pairs.result import Alternative, rival_score
-from scanweld.pairs.slippage import free_motions
 
 PUSH_DIAMETERS = 0.06
 """Length of a push, rotations counted as in the information: as far as rivals are from a pose."""

@@ -6,10 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from scanweld.geometry.arrays import FloatArray, frozen
-from scanweld.pairs.field import ScanField
-from scanweld.pairs.result import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
-from scanweld.pairs.visibility import (
+from scanweld.evidence.evidence import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.visibility import (
     AGREE,
     CONTRADICT,
     FREE,
@@ -18,6 +17,7 @@ from scanweld.pairs.visibility import (
     ask_forward,
     kernel_view,
 )
+from scanweld.geometry.arrays import FloatArray, frozen
 
 NUM_FIRST_LOOK = 8
 """Samples of each scan that decide whether a hypothesis is looked at again,"""

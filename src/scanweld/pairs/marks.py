@@ -17,13 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from scanweld.geometry.arrays import BoolArray, FloatArray
-from scanweld.geometry.pose import Pose
-from scanweld.pairs.distinct import distinct_poses
-from scanweld.pairs.field import RASTER_DEPTH, ScanField
-from scanweld.pairs.pixels import TwoWay, fallen_on, see
-from scanweld.pairs.result import CLEAN_SHARE, Alternative, rival_score
-from scanweld.pairs.told import (
+from scanweld.evidence.field import RASTER_DEPTH, ScanField
+from scanweld.evidence.patches import (
     MAX_REVERSE,
     MIN_MARK_PIXELS,
     Told,
@@ -33,7 +28,13 @@ from scanweld.pairs.told import (
     reverse,
     told_of,
 )
-from scanweld.pairs.visibility import pose_rows
+from scanweld.evidence.pixels import TwoWay, fallen_on, see
+from scanweld.evidence.rivals import CLEAN_SHARE
+from scanweld.evidence.visibility import pose_rows
+from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.distinct import distinct_poses
+from scanweld.pairs.result import Alternative, rival_score
 
 MIN_SAYING = 0.25
 """Share of the refuted poses that a mark's place refutes."""

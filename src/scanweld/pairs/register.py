@@ -6,6 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from scanweld.config import PairsConfig
+from scanweld.evidence.evidence import VIOLATION_WEIGHT
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.icp import IcpSchedule, icp
+from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
+from scanweld.evidence.visibility import count_evidence, kernel_view, pose_rows
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.alternatives import (
@@ -15,23 +20,16 @@ from scanweld.pairs.alternatives import (
     to_pose,
 )
 from scanweld.pairs.distinct import distinct_poses
-from scanweld.pairs.field import ScanField
 from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
-from scanweld.pairs.icp import IcpSchedule, icp
 from scanweld.pairs.marks import Decided, decide, ties
-from scanweld.pairs.result import VIOLATION_WEIGHT, Alternative, PairResult
+from scanweld.pairs.result import Alternative, PairResult
 from scanweld.pairs.turning import turn_to_mark
 from scanweld.pairs.verdict import result_of
-from scanweld.pairs.visibility import count_evidence, kernel_view, pose_rows
 
 SAME_ANGLE_DEG = 8.0
 """Hypotheses that differ by less than this,"""
 SAME_SHIFT_DIAMETERS = 0.04
 """and put the middle of j to within this of each other, come to the same."""
-RIVAL_ANGLE_DEG = 12.0
-"""Likewise for answers: what is nearer than this is the same answer, not a rival,"""
-RIVAL_SHIFT_DIAMETERS = 0.06
-"""if the shift is, too."""
 MAX_SWEPT = 4000
 """Hypotheses of each set of anchors that are kept at all."""
 NUM_RIVALS = 24

@@ -6,27 +6,12 @@ from enum import StrEnum
 
 import numpy as np
 
+from scanweld.evidence.evidence import MIN_AGREE, Evidence
+from scanweld.evidence.rivals import MIN_TOLD_SHARE, as_rival, margin_over, refutation
+from scanweld.evidence.slippage import Slippage
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.slippage import Slippage
 from scanweld.pairs.symmetry import Symmetry
-
-VIOLATION_WEIGHT = 3.0
-"""How much more a sample says that the other sensor contradicts than one that agrees."""
-CONTRADICT_WEIGHT = 1.5
-"""Samples with other normals say less: at edges normals are poor."""
-FREE_WEIGHT = 1.0 / 3.0
-"""Samples in free space say less still: real silhouettes have gaps."""
-MIN_AGREE = 0.05
-"""Share of agreeing samples below which two scans do not overlap."""
-CLEAN_SHARE, AS_CLEAN = 0.15, 1.3
-"""A rival is contradicted no more than a pose if its violations, as a share of what agrees, are
-within the first, or within so many times those of the pose."""
-MIN_RIVAL_SHARE = 0.35
-"""Least agreement of such a rival, as a share of that of the pose: slivers fit in many ways."""
-MIN_TOLD_SHARE = 0.15
-"""The same of a rival of which one wants to know how much contradicts it."""
-
 
 RESULT_FORMAT = 2
 """Raised when what is kept of a pair changes, so that work kept by another version is done anew."""
@@ -42,53 +27,6 @@ class PairKind(StrEnum):
     AMBIGUOUS = "ambiguous"
     CONTRADICTED = "contradicted"
     NO_OVERLAP = "no overlap"
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Evidence:
-    """What each scan's sensor says of the other's samples, as shares of all samples.
-
-    Shares of one direction or the mean of both directions; they sum to one but for samples whose
-    normals neither agree nor contradict.
-
-    Attributes:
-        agree: On the surface that the other sensor saw, normals alike.
-        front: Before the surface that the other sensor saw: it would have seen them.
-        contradict: On that surface, normals clearly different.
-        free: Where the other sensor looked past the object.
-        occluded: Behind the surface that the other sensor saw.
-        unknown: On pixels that say nothing.
-    """
-
-    agree: float
-    front: float
-    contradict: float
-    free: float
-    occluded: float
-    unknown: float
-
-    @property
-    def score(self) -> float:
-        """Agreement less weighted violations (docs/report.md): at most 1, which is perfect."""
-        violated = VIOLATION_WEIGHT * self.front + CONTRADICT_WEIGHT * self.contradict
-        return self.agree - violated - FREE_WEIGHT * self.free
-
-    @property
-    def violation(self) -> float:
-        """Share of samples that the other sensor contradicts in any way."""
-        return self.front + self.contradict + self.free
-
-    @property
-    def surface_violation(self) -> float:
-        """The same without free space, weighted as in the score: what *front* is worth."""
-        return self.front + CONTRADICT_WEIGHT / VIOLATION_WEIGHT * self.contradict
-
-
-def margin_over(score: float, rivals: Sequence[float]) -> float:
-    """Share of a score by which it beats its best rival: 1 without a rival, 0 if not positive."""
-    if score <= 0:
-        return 0.0
-    return min(1.0, (score - max(rivals)) / score) if rivals else 1.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -119,23 +57,6 @@ def rival_score(rival: Alternative, best: Alternative) -> float:
     told_share = told.violation / max(told.agree, MIN_AGREE)
     shares = said.violation / said.agree, told_share
     return as_rival(rival.score, (said.agree, told.agree), shares)
-
-
-def as_rival(score: float, agree: tuple[float, float], violated: tuple[float, float]) -> float:
-    """What a place scores as a rival of the best one.
-
-    A rival that is contradicted no more explains the scans as well, if they overlap less in it:
-    on a symmetric object the next turn does. It counts as if it overlapped as much.
-
-    Args:
-        score: Of the rival by itself.
-        agree: What agrees, in the rival and in the best place.
-        violated: Violations as a share of that, likewise.
-    """
-    bearable = max(CLEAN_SHARE, AS_CLEAN * violated[1])
-    if agree[0] <= MIN_RIVAL_SHARE * agree[1] or violated[0] > bearable:
-        return score
-    return score * max(1.0, agree[1] / agree[0])
 
 
 def near_best(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
@@ -178,18 +99,6 @@ def margin_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> fl
     """Margin of one of a pair's poses over the others."""
     others = [option for option in alternatives if option is not chosen]
     return margin_over(chosen.score, [rival_score(other, chosen) for other in others])
-
-
-def refutation(violated: Sequence[float]) -> float:
-    """How clearly the least contradicted rival of a pose is refuted.
-
-    Args:
-        violated: Violations of each rival, as a share of what agrees.
-
-    Returns:
-        That share for the best rival, at most 1: that of a pose without rivals.
-    """
-    return min([1.0, *violated])
 
 
 def refutation_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> float:

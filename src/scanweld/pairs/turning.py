@@ -9,13 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import ndimage
 
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.information import information_from, two_way_matches
+from scanweld.evidence.patches import agrees, coherent, told_of
+from scanweld.evidence.pixels import TwoWay, fallen_on, see
+from scanweld.evidence.slippage import Slide, slippage_of
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.pairs.field import ScanField
-from scanweld.pairs.information import information_from, two_way_matches
-from scanweld.pairs.pixels import TwoWay, fallen_on, see
-from scanweld.pairs.slippage import Slide, slippage_of
-from scanweld.pairs.told import agrees, coherent, told_of
 
 FIRST_STEP_DEG, STEP_DEG, FINE_STEP_DEG = 15.0, 3.0, 0.5
 """Between turns that show whether there is a mark at all, that find it, and that fit it."""

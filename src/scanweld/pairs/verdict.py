@@ -5,14 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from scanweld.config import PairsConfig
+from scanweld.evidence.evidence import MIN_AGREE
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.information import information_from, observability_of, two_way_matches
+from scanweld.evidence.slippage import Slide, Slippage, slide_words, slippage_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.alternatives import refined_at, schedules
-from scanweld.pairs.field import ScanField
 from scanweld.pairs.holding import comes_back
-from scanweld.pairs.information import information_from, observability_of, two_way_matches
 from scanweld.pairs.result import (
-    MIN_AGREE,
     Alternative,
     PairKind,
     PairResult,
@@ -20,7 +21,6 @@ from scanweld.pairs.result import (
     near_best,
     weights_of,
 )
-from scanweld.pairs.slippage import Slide, Slippage, slide_words, slippage_of
 from scanweld.pairs.symmetry import Symmetry, symmetry_of
 
 ALIKE_SHARE = 0.5

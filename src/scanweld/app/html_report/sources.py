@@ -12,8 +12,8 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import natural_key
-from scanweld.prepare import prepare
-from scanweld.prepare.sensor import locate_sensor
+from scanweld.preparation import prepare
+from scanweld.preparation.sensor import locate_sensor
 
 
 class Sources:

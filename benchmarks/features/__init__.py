@@ -1,0 +1,1 @@
+"""Descriptors of other papers, to compare PA-HKS with."""

@@ -1,0 +1,1 @@
+"""Measures of meshes that benchmarks alone need."""

@@ -1,0 +1,1 @@
+"""What the sensors of two scans say of ONE relative pose: visibility, matches, information."""

@@ -1,0 +1,52 @@
+"""The record of visibility evidence on a relative pose, and its score."""
+
+from dataclasses import dataclass
+
+VIOLATION_WEIGHT = 3.0
+"""How much more a sample says that the other sensor contradicts than one that agrees."""
+CONTRADICT_WEIGHT = 1.5
+"""Samples with other normals say less: at edges normals are poor."""
+FREE_WEIGHT = 1.0 / 3.0
+"""Samples in free space say less still: real silhouettes have gaps."""
+MIN_AGREE = 0.05
+"""Share of agreeing samples below which two scans do not overlap."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Evidence:
+    """What each scan's sensor says of the other's samples, as shares of all samples.
+
+    Shares of one direction or the mean of both directions; they sum to one but for samples whose
+    normals neither agree nor contradict.
+
+    Attributes:
+        agree: On the surface that the other sensor saw, normals alike.
+        front: Before the surface that the other sensor saw: it would have seen them.
+        contradict: On that surface, normals clearly different.
+        free: Where the other sensor looked past the object.
+        occluded: Behind the surface that the other sensor saw.
+        unknown: On pixels that say nothing.
+    """
+
+    agree: float
+    front: float
+    contradict: float
+    free: float
+    occluded: float
+    unknown: float
+
+    @property
+    def score(self) -> float:
+        """Agreement less weighted violations (docs/report.md): at most 1, which is perfect."""
+        violated = VIOLATION_WEIGHT * self.front + CONTRADICT_WEIGHT * self.contradict
+        return self.agree - violated - FREE_WEIGHT * self.free
+
+    @property
+    def violation(self) -> float:
+        """Share of samples that the other sensor contradicts in any way."""
+        return self.front + self.contradict + self.free
+
+    @property
+    def surface_violation(self) -> float:
+        """The same without free space, weighted as in the score: what *front* is worth."""
+        return self.front + CONTRADICT_WEIGHT / VIOLATION_WEIGHT * self.contradict

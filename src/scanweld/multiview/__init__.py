@@ -1,1 +1,0 @@
-"""Judged pairs -> poses of all scans: view graph and joint refinement."""

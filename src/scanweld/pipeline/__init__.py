@@ -1,0 +1,1 @@
+"""The run: scans in, reconstruction out, by either method."""

@@ -1,0 +1,154 @@
+"""What comes in: scans prepared, sorted by content, those that cannot take part, what is known."""
+
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanweld.config import Config
+from scanweld.errors import InputError
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.knowledge.facts import Knowledge
+from scanweld.knowledge.given import Given
+from scanweld.preparation import prepare, stands_on_support
+from scanweld.work.progress import ScanRefused
+from scanweld.work.stage_log import Stages
+
+Refuse = Callable[[str, str], None]
+"""Called with a scan's name and the reason why it cannot take part."""
+
+MAX_SIZE_RATIO = 6.0
+"""A scan this many times larger or smaller than the others is in another unit, or not of it."""
+MOST = 0.6
+"""Share of the scans that must show a table: a plane in a few of them is the object's own."""
+UNIT_RATIOS = {
+    1000.0: "m and mm",
+    100.0: "m and cm",
+    10.0: "cm and mm",
+    25.4: "in and mm",
+    39.37: "m and in",
+    2.54: "in and cm",
+}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Intake:
+    """The scans of a run.
+
+    Attributes:
+        prepared: Those that take part, ordered by their content.
+        diameter: Median diameter of these.
+        refused: Reason for each of the others, by name.
+        scans: All that could be read, by name.
+        knowledge: What users know beforehand, by name.
+        given: The same of those that take part, by index.
+    """
+
+    prepared: tuple[PreparedScan, ...]
+    diameter: float
+    refused: Mapping[str, str]
+    scans: Mapping[str, RangeScan]
+    knowledge: Knowledge
+    given: Given
+
+
+def take_in(
+    scans: Sequence[RangeScan],
+    unreadable: Mapping[str, str],
+    knowledge: Knowledge,
+    config: Config,
+    stages: Stages,
+) -> Intake:
+    """Prepare all scans; leave out duplicates, scans of another size and what shows no surface.
+
+    Raises:
+        InputError: If fewer than two scans are left, or two have the same name.
+        KnowledgeError: If what is known is about scans that are not there.
+    """
+    names = [scan.name for scan in scans]
+    if len(set(names)) < len(names):
+        raise InputError("two scans have the same name; names must be unique")
+    knowledge.check_names({*names, *unreadable})
+    refused = dict(unreadable)
+
+    def refuse(name: str, reason: str) -> None:
+        if name not in refused:
+            refused[name] = reason
+            stages.progress(ScanRefused(scan=name, reason=reason))
+
+    def prepare_each(standing: Container[str] = ()) -> list[PreparedScan]:
+        outcomes = stages.each(
+            "prepare",
+            lambda scan: _try_prepare(scan, config, scan.name in standing),
+            kept,
+            then=lambda scan, found: refuse(scan.name, found) if isinstance(found, str) else None,
+        )
+        return [found for found in outcomes if not isinstance(found, str)]
+
+    with stages.stage("prepare") as counts:
+        kept = _of_one_size(_without_duplicates(scans, refuse), refuse)
+        prepared = prepare_each()
+        standing = {scan.name for scan in prepared if stands_on_support(scan)}
+        if config.prepare.support == "left out" and len(standing) >= MOST * len(prepared):
+            prepared = prepare_each(standing)
+        counts["scans"] = len(prepared)
+        counts["refused"] = len(refused)
+    if len(prepared) < 2:
+        told = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
+        raise InputError(
+            f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}; give at least 2"
+            + (f" ({told})" if told else "")
+        )
+    prepared.sort(key=lambda scan: (scan.content_hash, scan.name))
+    return Intake(
+        prepared=tuple(prepared),
+        diameter=float(np.median([scan.diameter for scan in prepared])),
+        refused=refused,
+        scans={scan.name: scan for scan in scans},
+        knowledge=knowledge,
+        given=knowledge.by_index(prepared),
+    )
+
+
+def _without_duplicates(scans: Sequence[RangeScan], refuse: Refuse) -> list[RangeScan]:
+    first: dict[str, str] = {}
+    kept = []
+    for scan in sorted(scans, key=lambda scan: scan.name):
+        original = first.setdefault(scan.content_hash(), scan.name)
+        if original == scan.name:
+            kept.append(scan)
+        else:
+            refuse(scan.name, f"same content as {original}, which is kept")
+    return kept
+
+
+def _of_one_size(scans: Sequence[RangeScan], refuse: Refuse) -> list[RangeScan]:
+    sizes = [principal_diameter(scan.points) if len(scan.points) > 3 else 0.0 for scan in scans]
+    usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
+    kept = []
+    for scan, size in zip(scans, sizes, strict=True):
+        ratio = max(size / usual, usual / size) if size > 0 and usual > 0 else 1.0
+        if ratio <= MAX_SIZE_RATIO:
+            kept.append(scan)
+            continue
+        larger = "larger" if size > usual else "smaller"
+        told = f"{ratio:.3g} times {larger} than the other scans{_unit_hint(ratio)}"
+        refuse(scan.name, told)
+    return kept
+
+
+def _unit_hint(ratio: float) -> str:
+    closest = min(UNIT_RATIOS, key=lambda known: abs(np.log(ratio / known)))
+    if abs(np.log(ratio / closest)) > np.log(2.0):
+        return "; is it of the same object?"
+    return f"; units mixed up ({UNIT_RATIOS[closest]})? Give all scans in one unit"
+
+
+def _try_prepare(
+    scan: RangeScan, config: Config, without_support: bool = False
+) -> PreparedScan | str:
+    try:
+        return prepare(scan, config.prepare, without_support=without_support)
+    except InputError as error:
+        return str(error).removeprefix(f"{scan.name}: ")

@@ -1,0 +1,169 @@
+"""The line of sight of a scan without a grid, from its points alone.
+
+What one sensor saw is a height field along its line of sight: no two layers of it fall into one
+cell of a raster square to that line. Of all such lines the one is taken from which the surface is
+least steep on average, by a mean over all that are nearly as good as the best.
+"""
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.mesh import face_normals
+from scanweld.geometry.scan import RangeScan
+from scanweld.preparation.resolution import point_spacing
+
+MAX_POINTS = 20_000
+"""Points that the line of sight is sought with; the search begins with fewer."""
+FIRST_POINTS = 6_000
+NUM_COARSE = 300
+"""Directions tried over the half sphere (5 deg apart), and around the best ones (2 deg)."""
+NUM_FINE = 2_000
+NUM_STARTS = 6
+"""Distinct coarse directions that are looked at more closely."""
+START_DEG = 10.0
+CAP_DEG = 25.0
+"""Half angles of the caps of fine directions around a start and around the best of all."""
+CELL_SPACINGS = 1.5
+"""Cell of the raster, in spacings of the points."""
+LAYERED_CELLS = 1.5
+"""Standard deviation of depth within a cell, in cells, above which it holds several layers."""
+MAX_DEVIATION = 4.0
+STEEPNESS_WEIGHT = 0.1
+"""Weight of the mean deviation of depth, which stands for steepness, beside the layered share."""
+NEARLY = 0.005
+"""Excess of the cost by which a direction's weight falls by 1/e."""
+
+
+def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """The line along which points (N, 3) look most like a height field.
+
+    Returns:
+        The unit axis (3,), whose sign means nothing; a unit vector (3,) square to it; and the share
+        of the points that lie in cells of several layers: near 0 for a scan from one viewpoint.
+        Both vectors turn with the points.
+    """
+    frame = _principal_frame(points)
+    centred = (points - points.mean(axis=0)) @ frame.T
+    first = _thinned(centred, FIRST_POINTS)
+    cell = CELL_SPACINGS * point_spacing(first)
+    coarse, fine = _half_sphere(NUM_COARSE), _half_sphere(NUM_FINE)
+    candidates = np.concatenate(
+        [_cap(fine, start, START_DEG) for start in _starts(coarse, _costs(first, coarse, cell))]
+    )
+    best = candidates[int(np.argmin(_costs(first, candidates, cell)))]
+
+    dense = _thinned(centred, MAX_POINTS)
+    cell = CELL_SPACINGS * point_spacing(dense)
+    cap = _cap(fine, best, CAP_DEG)
+    costs = _costs(dense, cap, cell)
+    axis = np.exp((costs.min() - costs) / NEARLY) @ cap
+    axis /= np.linalg.norm(axis)
+    layered, _ = _depth_within_cells(dense, axis, cell)
+    right = _square_to(axis)
+    return axis @ frame, right @ frame, layered
+
+
+def surface_points(scan: RangeScan) -> FloatArray:
+    """At most 20,000 points of a scan; of a mesh, spread evenly over its faces."""
+    if scan.faces is None or not len(scan.faces):
+        return _thinned(scan.points, MAX_POINTS)
+    areas = np.linalg.norm(face_normals(scan.points, scan.faces), axis=1)
+    if not areas.sum() > 0:
+        return _thinned(scan.points, MAX_POINTS)
+    rng = np.random.default_rng(0)
+    steps = (np.arange(MAX_POINTS) + 0.5) / MAX_POINTS
+    chosen = np.searchsorted(np.cumsum(areas) / areas.sum(), steps)
+    u, v = rng.random((2, MAX_POINTS, 1))
+    a, b, c = (scan.points[scan.faces[chosen, k]] for k in range(3))
+    return a + (1 - np.sqrt(u)) * (b - a) + np.sqrt(u) * v * (c - a)
+
+
+def _thinned(points: FloatArray, max_points: int) -> FloatArray:
+    """At most so many of the points (N, 3), drawn evenly, always the same."""
+    if len(points) <= max_points:
+        return points
+    chosen = np.random.default_rng(0).choice(len(points), max_points, replace=False)
+    return points[np.sort(chosen)]
+
+
+def depth_image(points: FloatArray, axis: FloatArray, right: FloatArray, cell: float) -> FloatArray:
+    """Mean coordinate (H, W) along the axis (3,) of points (N, 3); NaN where there are none."""
+    cells, shape, depth = _raster(points, np.stack([right, np.cross(axis, right), axis]), cell)
+    count = np.bincount(cells, minlength=shape[0] * shape[1])
+    total = np.bincount(cells, weights=depth, minlength=shape[0] * shape[1])
+    image = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
+    return image.reshape(shape)
+
+
+def _principal_frame(points: FloatArray) -> FloatArray:
+    """A rotation (3, 3) to the points' principal axes; turns with the points."""
+    centred = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    lean = ((centred @ axes[:, 1:]) ** 3).sum(axis=0)
+    long, middle = axes[:, 2] * _sign(lean[1]), axes[:, 1] * _sign(lean[0])
+    return np.stack([long, middle, np.cross(long, middle)])
+
+
+def _half_sphere(count: int) -> FloatArray:
+    """Unit directions (count, 3) with z > 0, evenly spread on a spiral of golden angles."""
+    k = np.arange(count) + 0.5
+    z, turn = k / count, k * np.pi * (1 + np.sqrt(5))
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
+
+
+def _cap(axes: FloatArray, centre: FloatArray, degrees: float) -> FloatArray:
+    """Those of the axes within an angle of the centre (3,), turned to its side."""
+    cosine = axes @ centre
+    near = np.abs(cosine) >= np.cos(np.radians(degrees))
+    return axes[near] * np.sign(cosine[near])[:, None]
+
+
+def _starts(axes: FloatArray, costs: FloatArray) -> list[FloatArray]:
+    """The best few axes that are farther from each other than the caps around them reach."""
+    starts: list[FloatArray] = []
+    for axis in axes[np.argsort(costs, kind="stable")]:
+        if all(abs(axis @ other) < np.cos(np.radians(1.5 * START_DEG)) for other in starts):
+            starts.append(axis)
+        if len(starts) == NUM_STARTS:
+            break
+    return starts
+
+
+def _costs(points: FloatArray, axes: FloatArray, cell: float) -> FloatArray:
+    """How unlike a gentle height field the points are along each axis."""
+    found = np.array([_depth_within_cells(points, axis, cell) for axis in axes])
+    return found @ (1.0, STEEPNESS_WEIGHT)
+
+
+def _depth_within_cells(points: FloatArray, axis: FloatArray, cell: float) -> tuple[float, float]:
+    """Share of the points in layered cells, and the mean deviation of depth in cells."""
+    right = _square_to(axis)
+    cells, _, depth = _raster(points, np.stack([right, np.cross(axis, right), axis]), cell)
+    count = np.bincount(cells)
+    filled = np.maximum(count, 1)
+    mean = np.bincount(cells, weights=depth) / filled
+    variance = np.bincount(cells, weights=depth * depth) / filled - mean * mean
+    deviation = np.sqrt(np.maximum(variance, 0)) / cell
+    layered = float(count[deviation > LAYERED_CELLS].sum()) / len(points)
+    return layered, float(count @ np.minimum(deviation, MAX_DEVIATION)) / len(points)
+
+
+def _raster(
+    points: FloatArray, frame: FloatArray, cell: float
+) -> tuple[IntArray, tuple[int, int], FloatArray]:
+    """Cell numbers (N,), the raster's shape and depths (N,) along the last row of frame (3, 3)."""
+    right, down, depth = frame @ points.T
+    columns = ((right - right.min()) / cell).astype(np.int64)
+    rows = ((down - down.min()) / cell).astype(np.int64)
+    shape = (int(rows.max()) + 1, int(columns.max()) + 1)
+    return rows * shape[1] + columns, shape, depth
+
+
+def _square_to(axis: FloatArray) -> FloatArray:
+    other = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
+    return other / np.linalg.norm(other)
+
+
+def _sign(value: float) -> float:
+    return -1.0 if value < 0 else 1.0

@@ -1,0 +1,1 @@
+"""The method as published: PA-HKS matching and ICP, then M-ICC or MM-ICC."""

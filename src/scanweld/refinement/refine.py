@@ -1,0 +1,164 @@
+"""Joint refinement: one robust least squares over the poses of all scans at once."""
+
+import logging
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from scanweld.config import RefineConfig
+from scanweld.geometry.matches import Matches
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.refinement.least_squares import Found, Term, move_poses, weighted_terms
+from scanweld.refinement.surface_terms import SurfaceSource, surface_matches, surface_source
+
+logger = logging.getLogger(__name__)
+
+NUM_POINTS = 4000
+"""Surface points of a scan that take part."""
+MIN_MATCHES = 20
+"""A direction of a pair with fewer matches than this has no say."""
+SURFACE_NOISE_DIAMETERS = 1e-7
+"""Least spread of surface residuals: exact data have none."""
+OUTLINE_NOISE_PIXELS = 0.3
+"""Least spread of contour residuals: an outline is known to the pixel, no better."""
+MAX_STEP_DIAMETERS = 0.1
+"""A scan moves no farther in a round: matches say nothing about longer steps."""
+NUM_CONTOUR_ROUNDS = 4
+"""Contours take part in the last rounds: they cost most, and are sharp at nearly right poses."""
+
+ContourMatcher = Callable[[int, int, Pose], Matches]
+"""Contour matches of scans i and j, by index, at the pose ``j_from_i``: in the frame of j."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class PairResidual:
+    """How two scans lie on each other after the refinement.
+
+    Attributes:
+        num_matches: Surface matches, both directions.
+        rms: Of the robustly weighted point-to-plane residuals, in the scans' unit.
+    """
+
+    num_matches: int
+    rms: float
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Refinement:
+    """Refined poses, and how the pairs that overlap lie there.
+
+    Attributes:
+        poses: ``world_from_sensor`` of every scan that had one; the first scan's is unchanged.
+        pairs: Residuals of all pairs (i, j), i < j, that have surface matches.
+        rms: Over all matches, in the scans' unit; 0 where nothing overlaps.
+        step: Largest movement of a scan in the last round, as a share of the diameter.
+    """
+
+    poses: dict[int, Pose]
+    pairs: dict[tuple[int, int], PairResidual]
+    rms: float
+    step: float
+
+
+def refine_poses(
+    scans: Sequence[PreparedScan],
+    world_from_sensor: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
+    config: RefineConfig,
+    contour_matches: ContourMatcher | None = None,
+) -> Refinement:
+    """Refine all poses together by surface and contour matches.
+
+    Surfaces are matched between all scans that overlap at the current poses, point to plane and
+    in both directions, within a radius that shrinks from round to round. Contours are matched in
+    the last rounds, between those of the given pairs whose surfaces touch: alone they hold a
+    pair too weakly. The first scan stays where it is.
+
+    Args:
+        scans: All scans.
+        world_from_sensor: Start poses of those to refine, by index in ``scans``.
+        pairs: Adjacent views, whose contours are matched.
+        config: Rounds, radii and the weight of the contours.
+        contour_matches: Finds contour matches; without it there is no contour term.
+    """
+    poses = dict(sorted(world_from_sensor.items()))
+    if len(poses) < 2:
+        return Refinement(poses=poses, pairs={}, rms=0.0, step=0.0)
+    sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
+    diameter = float(np.median([scans[k].diameter for k in poses]))
+    pixel = float(np.median([scans[k].image.pixel for k in poses]))
+    noise = SURFACE_NOISE_DIAMETERS * diameter, OUTLINE_NOISE_PIXELS * pixel
+    contour_rounds = NUM_CONTOUR_ROUNDS if config.contour_weight > 0 else 0
+    views = {(min(pair), max(pair)) for pair in pairs}
+    step = 0.0
+    for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
+        surface = match_surfaces(sources, poses, float(radius) * diameter)
+        contour: list[Found] = []
+        if contour_matches is not None and n >= config.num_rounds - contour_rounds:
+            touching = {(min(i, j), max(i, j)) for i, j, _ in surface}
+            contour = _match_contours(poses, sorted(touching & views), contour_matches)
+        terms = weighted_terms(surface, contour, poses, config.contour_weight, noise)
+        poses, moved = move_poses(terms, poses, diameter / 3, MAX_STEP_DIAMETERS * diameter)
+        step = moved / diameter
+        logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
+    surface = match_surfaces(sources, poses, config.match_diameters[1] * diameter)
+    terms = weighted_terms(surface, [], poses, 0.0, noise)
+    rms = _rms(terms)
+    logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
+    return Refinement(poses=poses, pairs=_residuals(terms), rms=rms, step=step)
+
+
+def scan_rms(refinement: Refinement) -> dict[int, float]:
+    """Residual rms of each scan that has matches, over all its pairs; in the scans' unit."""
+    sums: dict[int, tuple[float, int]] = {}
+    for pair, residual in refinement.pairs.items():
+        for k in pair:
+            square, count = sums.get(k, (0.0, 0))
+            added = residual.num_matches * residual.rms**2
+            sums[k] = square + added, count + residual.num_matches
+    return {k: float(np.sqrt(square / count)) for k, (square, count) in sorted(sums.items())}
+
+
+def match_surfaces(
+    sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], radius: float
+) -> list[Found]:
+    """Point-to-plane matches between all scans that touch at their poses, in both directions."""
+    found = []
+    for i, j in permutations(poses, 2):
+        matches = surface_matches(sources[i], sources[j], poses[j].inverse() @ poses[i], radius)
+        if len(matches) >= MIN_MATCHES:
+            found.append((i, j, matches))
+    return found
+
+
+def _match_contours(
+    poses: Mapping[int, Pose],
+    views: Sequence[tuple[int, int]],
+    contour_matches: ContourMatcher,
+) -> list[Found]:
+    found = []
+    for pair in views:
+        for i, j in (pair, pair[::-1]):
+            matches = contour_matches(i, j, poses[j].inverse() @ poses[i])
+            if len(matches) >= MIN_MATCHES:
+                found.append((i, j, matches))
+    return found
+
+
+def _rms(terms: Sequence[Term]) -> float:
+    total = sum(float(term.weights.sum()) for term in terms)
+    square = sum(float(term.weights @ term.residuals**2) for term in terms)
+    return float(np.sqrt(square / total)) if total > 0 else 0.0
+
+
+def _residuals(terms: Sequence[Term]) -> dict[tuple[int, int], PairResidual]:
+    both: dict[tuple[int, int], list[Term]] = {}
+    for term in terms:
+        both.setdefault((min(term.i, term.j), max(term.i, term.j)), []).append(term)
+    return {
+        pair: PairResidual(num_matches=sum(len(term.residuals) for term in sides), rms=_rms(sides))
+        for pair, sides in sorted(both.items())
+    }

@@ -1,0 +1,159 @@
+"""Scans whose unit is a little off: the scales that would make the placed surfaces agree."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import damped, motion_of
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.refinement.least_squares import Term, weighted_terms
+from scanweld.refinement.refine import (
+    NUM_POINTS,
+    SURFACE_NOISE_DIAMETERS,
+    match_surfaces,
+)
+from scanweld.refinement.surface_terms import SurfaceSource, surface_source
+
+MATCH_DIAMETERS = 0.012
+"""Farthest match: a scale that is off by a percent moves surfaces by half of that."""
+CORRELATED_MATCHES = 30.0
+"""Neighbouring matches err alike: so many are worth one."""
+NUM_ROUNDS = 4
+NUM_UNKNOWNS = 7
+MIN_ERROR = 0.004
+"""Scales that are off by less are within what sensors do,"""
+MIN_DEVIATIONS = 4.0
+"""and so are those within so many standard deviations."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScaleEstimate:
+    """How many times too large a scan is, beside the usual one of its component.
+
+    Attributes:
+        factor: 1 for a scan in the unit of the others.
+        deviation: Standard deviation of the factor.
+    """
+
+    factor: float
+    deviation: float
+
+    @property
+    def is_off(self) -> bool:
+        """Whether the scan is surely in another unit than the others, by however little."""
+        error = abs(self.factor - 1.0)
+        return error > max(MIN_ERROR, MIN_DEVIATIONS * self.deviation)
+
+    def words(self) -> str:
+        """What is wrong with the scan's scale."""
+        larger = (
+            f"{self.factor:.3f} times too large"
+            if self.factor > 1
+            else (f"{1 / self.factor:.3f} times too small")
+        )
+        return f"its scale is off: {larger} beside the other scans (± {self.deviation:.3f})"
+
+
+def estimate_scales(
+    scans: Sequence[PreparedScan], world_from_sensor: Mapping[int, Pose]
+) -> dict[int, ScaleEstimate]:
+    """Free the scale of every placed scan beside its pose, in a few steps of least squares.
+
+    Args:
+        scans: All scans.
+        world_from_sensor: Refined poses of a component's, by index in ``scans``.
+
+    Returns:
+        Estimates of the scans whose surfaces touch others', by index.
+    """
+    poses = dict(sorted(world_from_sensor.items()))
+    diameter = float(np.median([scans[k].diameter for k in poses]))
+    sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
+    logs = dict.fromkeys(poses, 0.0)
+    deviations: dict[int, float] = {}
+    order: list[int] = []
+    for _ in range(NUM_ROUNDS):
+        grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
+        terms = _surface_terms(grown, poses, diameter)
+        order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
+        if len(order) < 2:
+            return {}
+        centres = {k: poses[k].apply(grown[k].points.mean(axis=0)) for k in order}
+        twists, steps, spreads = _solve(terms, order, centres, diameter / 3)
+        middle = np.mean([centres[k] for k in order], axis=0)
+        for k, twist, step, spread in zip(order, twists, steps, spreads, strict=True):
+            # Grown about the sensor in the next round, it is moved back to where it was.
+            about = poses[k].translation
+            back = (1.0 - np.exp(step)) * (centres[k] - about)
+            stay = Pose(rotation=np.eye(3), translation=back)
+            poses[k] = motion_of(twist, middle, diameter / 3) @ stay @ poses[k]
+            logs[k] -= step
+            deviations[k] = float(spread)
+    usual = float(np.median([logs[k] for k in order]))
+    return {
+        k: ScaleEstimate(factor=float(np.exp(logs[k] - usual)), deviation=deviations[k])
+        for k in order
+    }
+
+
+def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:
+    """The same surface as a sensor sees it whose ranges are longer by a factor."""
+    camera = np.array(source.camera)
+    if camera[0] != 0.0:
+        camera[1:3] /= factor
+    return replace(
+        source, points=factor * source.points, depth=factor * source.depth, camera=camera
+    )
+
+
+def _surface_terms(
+    sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], diameter: float
+) -> list[Term]:
+    found = match_surfaces(sources, poses, MATCH_DIAMETERS * diameter)
+    noise = SURFACE_NOISE_DIAMETERS * diameter, 1.0
+    return weighted_terms(found, [], poses, 0.0, noise)
+
+
+def _solve(
+    terms: Sequence[Term], order: Sequence[int], centres: Mapping[int, FloatArray], arm: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Twists (N, 6) and growths (N,) that make surfaces agree, and the growths' deviations."""
+    size = NUM_UNKNOWNS * len(order)
+    place = {k: slice(NUM_UNKNOWNS * n, NUM_UNKNOWNS * (n + 1)) for n, k in enumerate(order)}
+    normal, gradient = np.zeros((size, size)), np.zeros(size)
+    centre = np.mean([centres[k] for k in order], axis=0)
+    square, count = 0.0, 0.0
+    for term in terms:
+        a, b = place[term.i], place[term.j]
+        by_motion = term.jacobian(centre, arm)
+        by_i = np.c_[by_motion, _by_growth(term, centres[term.i])]
+        by_j = -np.c_[by_motion, _by_growth(term, centres[term.j])]
+        weights = term.weights[:, None]
+        normal[a, a] += (weights * by_i).T @ by_i
+        normal[b, b] += (weights * by_j).T @ by_j
+        cross = (weights * by_i).T @ by_j
+        normal[a, b] += cross
+        normal[b, a] += cross.T
+        gradient[a] += (weights * by_i).T @ term.residuals
+        gradient[b] += (weights * by_j).T @ term.residuals
+        square += float(term.weights @ term.residuals**2)
+        count += float(term.weights.sum())
+    growths = np.arange(NUM_UNKNOWNS - 1, size, NUM_UNKNOWNS)
+    # The first scan stays, and a growth of all together is not seen: theirs sum to 0.
+    normal[np.ix_(growths, growths)] += np.trace(normal) / size
+    free = np.arange(NUM_UNKNOWNS - 1, size)
+    inverse = np.linalg.inv(damped(normal[np.ix_(free, free)]))
+    solved = np.zeros(size)
+    solved[free] = -inverse @ gradient[free]
+    variance = np.zeros(size)
+    variance[free] = np.diag(inverse) * CORRELATED_MATCHES * square / max(count, 1e-300)
+    steps = solved.reshape(-1, NUM_UNKNOWNS)
+    return steps[:, :-1], steps[:, -1], np.sqrt(variance[growths])
+
+
+def _by_growth(term: Term, centre: FloatArray) -> FloatArray:
+    """Change of the residuals (N,) by the growth of a scan about its centre."""
+    return np.einsum("nk,nk->n", term.directions, term.points - centre)

@@ -1,0 +1,1 @@
+"""How work is carried out: threads, progress, the log of stages, compiled kernels."""

@@ -1,0 +1,114 @@
+"""The bookkeeping of a run: stages timed and counted, finished work kept and found again."""
+
+import hashlib
+import logging
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import TypeVar
+
+from scanweld.config import Section
+from scanweld.work.progress import Cache, Progress, StageAdvanced, telling
+from scanweld.work.threads import map_in_order
+
+logger = logging.getLogger(__name__)
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StageReport:
+    """Time and memory of a stage, and what it counted.
+
+    Attributes:
+        seconds: Wall time.
+        peak_mb: Peak resident memory of the process at the stage's end.
+        counts: What was counted, such as {"pairs": 45, "accepted": 25}.
+    """
+
+    seconds: float
+    peak_mb: float
+    counts: Mapping[str, int | float] = field(default_factory=dict)
+
+
+@dataclass(kw_only=True, slots=True)
+class Stages:
+    """Runs a pipeline's stages one after the other.
+
+    Attributes:
+        workers: Threads that work over scans and pairs.
+        cache: Where finished work is kept.
+        progress: Told what happens.
+        reports: Time, memory and counts of the stages so far.
+    """
+
+    workers: int
+    cache: Cache
+    progress: Progress
+    reports: dict[str, StageReport] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[dict[str, int | float]]:
+        """Time a stage; what is put into the yielded dict is reported as its counts."""
+        start = time.perf_counter()
+        with telling(self.progress, name) as counts:
+            yield counts
+        seconds = time.perf_counter() - start
+        self.reports[name] = StageReport(seconds=seconds, peak_mb=peak_memory_mb(), counts=counts)
+        told = ", ".join(f"{key} {value}" for key, value in counts.items())
+        logger.info("%s: %s (%.1f s)", name, told, seconds)
+
+    def each(
+        self,
+        name: str,
+        function: Callable[[Item], Result],
+        items: Sequence[Item],
+        key: Callable[[Item], str] | None = None,
+        then: Callable[[Item, Result], None] | None = None,
+    ) -> list[Result]:
+        """Apply a function to every item, in parallel.
+
+        Args:
+            name: Of the stage.
+            function: What is to be done.
+            items: With what.
+            key: Of an item's work; if given, finished work is kept and found again.
+            then: Called with each item and its result, in order, as soon as that is there.
+        """
+
+        def finished(item: Item) -> Result:
+            if key is None:
+                return function(item)
+            name_of_work = key(item)
+            kept = self.cache.get(name_of_work)
+            if kept is not None:
+                return kept  # type: ignore[return-value]  # what put() kept under the same key
+            result = function(item)
+            self.cache.put(name_of_work, result)
+            return result
+
+        results = []
+        for item, result in zip(items, map_in_order(finished, items, self.workers), strict=True):
+            results.append(result)
+            if then is not None:
+                then(item, result)
+            self.progress(StageAdvanced(stage=name, done=len(results), total=len(items)))
+        return results
+
+
+def work_key(stage: str, *parts: str | float | Section) -> str:
+    """A hex key of a piece of work: the stage, its input's hashes, its settings, our version."""
+    told = [version("scanweld"), stage]
+    told += [part.model_dump_json() if isinstance(part, Section) else repr(part) for part in parts]
+    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+
+
+def peak_memory_mb() -> float:
+    """Peak resident memory of this process so far."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (2**20 if sys.platform == "darwin" else 2**10)
