@@ -130,8 +130,8 @@ def _draw_coarse(records: Sequence[Record], out: Path) -> str:
         (`published/m_icc.py`). (c) The coarse step as published: matched PA-HKS keypoints, then ICP
         (`published/coarse.py`). (d) The default (`pairs/register.py`), which takes no start.
         Below: a level cut through the scans, over that through the mesh (grey). Errors of rotation,
-        and of the middle of the moved scan in % of *D*: {told}. [Table 1](table1.md) has all gaps and view
-        directions.""",
+        and of the middle of the moved scan in % of *D*: {told}. [Table 1](table1.md) has all
+        gaps and view directions.""",
     )
 
 
