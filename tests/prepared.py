@@ -5,12 +5,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from scanweld.config import PrepareConfig
+from scanweld.config import PairsConfig, PrepareConfig
 from scanweld.evidence.field import ScanField, make_field
+from scanweld.evidence.judge import Judge
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
+from scanweld.pairs.problem import PairProblem
 from scanweld.preparation import prepare
 from tests.scenes import Scene, pair_at_gap
 
@@ -23,6 +25,17 @@ class PreparedPair:
     fields: tuple[ScanField, ScanField]
     i_from_j: Pose
     diameter: float
+
+    def problem(self, config: PairsConfig | None = None) -> PairProblem:
+        """The pair as the search is asked."""
+        i, j = self.fields
+        config = config or PairsConfig()
+        return PairProblem(edge=(0, 1), i=i, j=j, diameter=self.diameter, config=config)
+
+    def judge(self) -> Judge:
+        """The two scans as later stages ask them."""
+        tolerance = PairsConfig().fine_tolerance_diameters * self.diameter
+        return Judge(fields=self.fields, diameter=self.diameter, tolerance=tolerance)
 
     def off_by(self, i_from_j: Pose) -> tuple[float, float]:
         """Error of a pose: degrees, and shift of j's centre in diameters."""

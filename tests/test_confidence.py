@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scanweld.confidence.assess import OPEN, assess
+from scanweld.confidence.assess import MAX_UNDECIDED_CONFIDENCE, assess
+from scanweld.confidence.diagnostics import Fit, PairDiagnostics, diagnostics_of
 from scanweld.confidence.joint_evidence import joint_evidence
-from scanweld.confidence.links import links
 from scanweld.confidence.misfit import misfit, sure_offsets
 from scanweld.confidence.model import (
     MAX_CONFIDENCE,
@@ -20,17 +20,15 @@ from scanweld.confidence.model import (
     read_calibration,
     stored_calibration,
 )
-from scanweld.confidence.witnesses import Looks, Witnesses, witnesses_of
+from scanweld.confidence.ties import ties_of
 from scanweld.config import Config, FusionConfig
 from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.graph.view_graph import Component, ViewGraph
-from scanweld.pairs.alternatives import alternative_at
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.pairs.verdict import result_of
 from scanweld.pipeline.run import run
-from scanweld.pipeline.stages import pair_judge
 from scanweld.reconstruction import Reconstruction
 from tests.prepared import PreparedPair, creature_pair
 from tests.scenes import MILD_NOISE, Scene, creature_scene, pair_at_gap, primitive_scene
@@ -116,7 +114,7 @@ def test_links_are_the_weakest_cut():
     2 --- 3 ... 4 (.5: 0.7)
     """
     edges = {(0, 1): 0.9, (0, 2): 0.9, (1, 2): 0.9, (1, 3): 0.9, (2, 3): 0.9, (3, 4): 0.5}
-    tied = links(component_of(5), edges)
+    tied = ties_of(component_of(5), edges)
     one = -np.log(0.1)
     assert [tied[k] for k in range(4)] == pytest.approx([2 * one] * 4, abs=0.01)
     assert tied[4] == pytest.approx(-np.log(0.5), abs=0.01)
@@ -125,7 +123,7 @@ def test_links_are_the_weakest_cut():
 def test_a_component_hangs_by_its_bridge():
     """Two firm triangles joined by one weak pair: beyond it nobody is surer than that pair."""
     firm = {(0, 1): 0.99, (0, 2): 0.99, (1, 2): 0.99, (3, 4): 0.99, (3, 5): 0.99, (4, 5): 0.99}
-    tied = links(component_of(6), {**firm, (2, 3): 0.6})
+    tied = ties_of(component_of(6), {**firm, (2, 3): 0.6})
     assert min(tied[k] for k in (0, 1, 2)) > 4.6
     assert max(tied[k] for k in (3, 4, 5)) == pytest.approx(-np.log(0.4), abs=0.01)
 
@@ -175,21 +173,24 @@ def test_pairs_conduct_like_wires(monkeypatch: pytest.MonkeyPatch):
     accepted = {edge: pair.alternatives[0] for edge, pair in pairs.items()}
     component = component_of(3)
     graph = ViewGraph(
-        pairs=pairs, accepted=accepted, rejected={}, components=(component,), unplaced={}
+        pairs=pairs,
+        usable=pairs,
+        accepted=accepted,
+        rejected={},
+        components=(component,),
+        unplaced={},
     )
-    looks = Looks(observability=1.0, residual=0.0, misfit=0.0, coherence=1.0)
-    monkeypatch.setattr("scanweld.confidence.joint_evidence._looks", lambda *_: looks)
-    witnesses = Witnesses(
-        fields=creature_pair(40).fields + creature_pair(40).fields,
+    fit = Fit(observability=1.0, residual=0.0, misfit=0.0, coherence=1.0)
+    monkeypatch.setattr("scanweld.confidence.joint_evidence._fit", lambda *_: fit)
+    pair = creature_pair(40)
+    diagnostics = PairDiagnostics(
+        judge=replace(pair.judge(), fields=pair.fields + pair.fields),
         sources=[],
-        judge=lambda i, j, i_from_j: evidence(0.5),
         cohere=lambda i, j, i_from_j: 1.0,
-        tolerance=0.01,
-        diameter=1.0,
     )
-    joint = joint_evidence(graph, component, witnesses)
+    joint = joint_evidence(graph, component, diagnostics)
     assert joint.conductance[0, 1] == pytest.approx(0.7, abs=1e-3)
-    assert joint.support_besides((0, 1), 0.4) == pytest.approx(0.3, abs=1e-3)
+    assert joint.conductance_without((0, 1), 0.4) == pytest.approx(0.3, abs=1e-3)
 
 
 # Confidence of rendered scans
@@ -244,22 +245,21 @@ def planted(
 ) -> float:
     """The confidence in a pose that somebody put into the view graph, of two scans alone."""
     config = Config()
-    tolerance = config.pairs.tolerance_diameters[2]
-    option = alternative_at(*pair.fields, i_from_j, tolerance * pair.diameter)
-    result = result_of(0, 1, *pair.fields, (option,), pair.diameter, config.pairs)
+    option = pair.problem().evaluate(i_from_j)
+    result = result_of(pair.problem(), (option,))
     seen = result.observability if observability is None else observability
     result = replace(result, kind=kind, observability=seen)
     component = Component(poses={0: Pose.identity(), 1: i_from_j}, reference=0)
     graph = ViewGraph(
         pairs={(0, 1): result},
+        usable={(0, 1): result},
         accepted={(0, 1): option},
         rejected={},
         components=(component,),
         unplaced={},
     )
-    judge = pair_judge(pair.fields, pair.diameter, config)
-    witnesses = witnesses_of(pair.scans, pair.fields, pair.diameter, judge, config)
-    found = assess(graph, witnesses, stored_calibration(), config)
+    diagnostics = diagnostics_of(pair.scans, pair.judge(), config.contours)
+    found = assess(graph, diagnostics, stored_calibration(), config)
     # No scan is surer than the only pair that holds it; links are whole numbers of their steps.
     assert max(found.scans[k].confidence for k in (0, 1)) < found.pairs[0, 1].confidence + 1e-3
     return found.pairs[0, 1].confidence
@@ -290,10 +290,10 @@ def test_confidence_knows_no_unit_and_no_order():
 @pytest.mark.parametrize("kind", [kind for kind in PairKind if kind is not PairKind.GOOD])
 def test_two_scans_alone_never_decide_what_they_leave_open(kind: PairKind):
     pair = creature_pair(40)
-    assert planted(pair, pair.i_from_j, kind) == OPEN < 0.5
+    assert planted(pair, pair.i_from_j, kind) == MAX_UNDECIDED_CONFIDENCE < 0.5
 
 
 def test_what_only_icp_holds_two_scans_alone_do_not_decide_either():
     pair = creature_pair(40)
-    assert planted(pair, pair.i_from_j, observability=0.0) == OPEN
-    assert planted(pair, pair.i_from_j, observability=1e-2) > OPEN
+    assert planted(pair, pair.i_from_j, observability=0.0) == MAX_UNDECIDED_CONFIDENCE
+    assert planted(pair, pair.i_from_j, observability=1e-2) > MAX_UNDECIDED_CONFIDENCE

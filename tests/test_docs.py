@@ -18,12 +18,12 @@ from benchmarks.paper.study import Study, read_records
 from benchmarks.paper.tables import table, table_names
 from scanweld.config import Config
 from scanweld.errors import InputError
+from scanweld.evidence import rivals
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, FREE_WEIGHT, MIN_AGREE, VIOLATION_WEIGHT
 from scanweld.evidence.visibility import AGREE_COSINE, CONTRADICT_COSINE
 from scanweld.graph.reasons import OUTWEIGHED
 from scanweld.graph.refine_graph import MAX_SCORE_LOSS
 from scanweld.knowledge import turntable
-from scanweld.pairs import register
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -149,10 +149,10 @@ def test_report_page_gives_the_limits_of_the_code():
         f"n·m < {CONTRADICT_COSINE:g}",
         f"agree - {VIOLATION_WEIGHT:g} * front - {CONTRADICT_WEIGHT:g} * contradict - free / 3",
         f"agree < {MIN_AGREE:g}",
-        f"more than {register.RIVAL_ANGLE_DEG:g} degrees or "
-        f"{100 * register.RIVAL_SHIFT_DIAMETERS:g} % of the diameter away",
-        f"The limits of a distinct pose are {register.RIVAL_ANGLE_DEG:g} degrees and "
-        f"{100 * register.RIVAL_SHIFT_DIAMETERS:g} % of the diameter",
+        f"more than {rivals.RIVAL_ANGLE_DEG:g} degrees or "
+        f"{100 * rivals.RIVAL_SHIFT_DIAMETERS:g} % of the diameter away",
+        f"The limits of a distinct pose are {rivals.RIVAL_ANGLE_DEG:g} degrees and "
+        f"{100 * rivals.RIVAL_SHIFT_DIAMETERS:g} % of the diameter",
         f"turn by more than {turntable.MIN_TURN_DEG:g} degrees",
         f"agree on less than {MIN_AGREE:g}",
         f"more than {MAX_SCORE_LOSS:g} of their mean score",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanweld.evidence.evidence import Evidence
-from scanweld.evidence.visibility import judge, mean_evidence
+from scanweld.evidence.visibility import mean_evidence, two_way_evidence
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
@@ -23,7 +23,7 @@ def shifted(pair: PreparedPair, along_j: FloatArray) -> Pose:
 
 
 def evidence_at(pair: PreparedPair, i_from_j: Pose) -> tuple[Evidence, Evidence]:
-    return judge(*pair.fields, i_from_j, TOLERANCE * pair.diameter)
+    return two_way_evidence(*pair.fields, i_from_j, TOLERANCE * pair.diameter)
 
 
 def shares(evidence: Evidence) -> FloatArray:
@@ -44,7 +44,7 @@ def test_at_the_truth_nothing_is_violated(gap: int, model: CameraModel):
 def test_a_scan_of_itself_agrees_with_itself(model: CameraModel):
     pair = creature_pair(30, model)
     field = pair.fields[0]
-    said, back = judge(field, field, Pose.identity(), 1e-6 * pair.diameter)
+    said, back = two_way_evidence(field, field, Pose.identity(), 1e-6 * pair.diameter)
     assert said.agree == back.agree == 1.0
     assert said.score == 1.0 and said.violation == 0.0
 
@@ -87,8 +87,8 @@ def test_flipped_normals_contradict():
     pair = creature_pair(30)
     i, j = pair.fields
     flipped = replace(j, normals=-j.normals)
-    _, true = judge(i, j, pair.i_from_j, TOLERANCE * pair.diameter)
-    _, said = judge(i, flipped, pair.i_from_j, TOLERANCE * pair.diameter)
+    _, true = two_way_evidence(i, j, pair.i_from_j, TOLERANCE * pair.diameter)
+    _, said = two_way_evidence(i, flipped, pair.i_from_j, TOLERANCE * pair.diameter)
     assert said.agree == 0.0 and said.contradict >= true.agree > 0.6
     assert said.front == true.front and said.occluded == true.occluded
 
@@ -125,7 +125,7 @@ def test_swapping_the_scans_swaps_what_they_say():
     i, j = pair.fields
     for pose in random_poses(pair, 20):
         of_i, of_j = evidence_at(pair, pose)
-        swapped = judge(j, i, pose.inverse(), TOLERANCE * pair.diameter)
+        swapped = two_way_evidence(j, i, pose.inverse(), TOLERANCE * pair.diameter)
         # The inverse rounds differently: a sample on a pixel's border may change sides.
         np.testing.assert_allclose(shares(of_i), shares(swapped[1]), atol=0.005)
         np.testing.assert_allclose(shares(of_j), shares(swapped[0]), atol=0.005)
@@ -145,7 +145,7 @@ def test_a_wider_tolerance_forgives_more():
     pose = shifted(pair, np.array([0, 0, 0.02]))
     agree, front = [], []
     for tolerance in (0.005, 0.01, 0.02, 0.04):
-        of_i, of_j = judge(*pair.fields, pose, tolerance * pair.diameter)
+        of_i, of_j = two_way_evidence(*pair.fields, pose, tolerance * pair.diameter)
         said = mean_evidence(of_i, of_j)
         agree.append(said.agree + said.contradict)
         front.append(said.front)
@@ -165,8 +165,8 @@ def test_the_truth_scores_better_than_any_wrong_pose():
 
 def test_fewer_samples_say_about_the_same():
     pair = creature_pair(30)
-    whole = judge(*pair.fields, pair.i_from_j, TOLERANCE * pair.diameter)
-    few = judge(*pair.fields, pair.i_from_j, TOLERANCE * pair.diameter, 200)
+    whole = two_way_evidence(*pair.fields, pair.i_from_j, TOLERANCE * pair.diameter)
+    few = two_way_evidence(*pair.fields, pair.i_from_j, TOLERANCE * pair.diameter, 200)
     np.testing.assert_allclose(shares(few[0]), shares(whole[0]), atol=0.06)
     # Shares of exactly 200 samples.
     np.testing.assert_allclose(200 * shares(few[0]) % 1.0 % (1 - 1e-9), 0, atol=1e-9)

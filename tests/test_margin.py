@@ -10,7 +10,7 @@ from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.rivals import as_rival
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import Alternative, PairKind, margin_among, refutation_among
-from scanweld.pairs.verdict import classify_pair
+from scanweld.pairs.verdict import Measured, classify_pair
 from tests.results import turned
 
 
@@ -83,5 +83,6 @@ def test_the_pair_of_a_toothed_wheel_is_ambiguous():
         Alternative(i_from_j=Pose.identity(), evidence=evidence(0.9, front=0.01)),
         Alternative(i_from_j=turned(1), evidence=evidence(0.4, front=0.005)),
     )
-    found = classify_pair(0, 1, options, np.eye(6), 0.1, None, PairsConfig())
+    measured = Measured(information=np.eye(6), rms=0.1)
+    found = classify_pair((0, 1), options, measured, PairsConfig())
     assert found.kind is PairKind.AMBIGUOUS and len(found.alternatives) == 2

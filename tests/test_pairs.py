@@ -1,5 +1,6 @@
 """Pair registration from any start pose: exact truth found, and what must not be believed."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -15,10 +16,10 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features, describe
-from scanweld.pairs.alternatives import to_pose
 from scanweld.pairs.anchors import even_anchors, pair_anchors
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
+from scanweld.pairs.problem import to_pose
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
 from tests.prepared import PreparedPair, creature_pair, pair_of_scene, prepared_pair
@@ -39,7 +40,7 @@ def registered(pair: PreparedPair, config: PairsConfig = CONFIG) -> PairResult:
         for field, scan in zip(pair.fields, pair.scans, strict=True)
     ]
     both = list(zip(*anchors, strict=True))
-    return register_pair(0, 1, *pair.fields, both, pair.diameter, config)
+    return register_pair(pair.problem(config), both)
 
 
 @lru_cache
@@ -96,13 +97,21 @@ def test_alternatives_are_distinct_and_in_order():
             assert apart.angle_deg() > 11 or shift > 0.05
 
 
+@dataclass(frozen=True)
+class ToTruth:
+    """A refinement that arrives from anywhere."""
+
+    i_from_j: Pose
+
+    def refine(self, i_from_j: Pose) -> Pose:
+        return self.i_from_j
+
+
 def test_an_answer_is_no_rival_of_itself():
     """A refinement from afar brings both of the best poses to the truth."""
     pair = creature_pair(30)
     anchors = [(even_anchors(pair.fields[0], 64), even_anchors(pair.fields[1], 64))]
-    result = register_pair(
-        0, 1, *pair.fields, anchors, pair.diameter, CONFIG, polish=lambda pose: pair.i_from_j
-    )
+    result = register_pair(pair.problem(), anchors, ToTruth(pair.i_from_j))
     errors = [pair.off_by(option.i_from_j) for option in result.alternatives]
     assert sum(degrees < 12 and shift < 0.06 for degrees, shift in errors) == 1
     assert result.kind is PairKind.GOOD and result.margin > CONFIG.min_margin
@@ -271,7 +280,7 @@ def test_without_anchors_there_are_no_hypotheses():
     none = Anchors(points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
     rows, scores = sweep(*pair.fields, none, none, 8, 1.0, 10)
     assert rows.shape == (0, 12) and scores.shape == (0,)
-    result = register_pair(0, 1, *pair.fields, [(none, none)], pair.diameter, CONFIG)
+    result = register_pair(pair.problem(), [(none, none)])
     assert result.kind is PairKind.NO_OVERLAP and result.best is None
 
 

@@ -19,8 +19,8 @@ from scanweld.evaluation.metrics import (
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet
+from scanweld.pairs import registrar
 from scanweld.pairs.result import PairResult
-from scanweld.pipeline import robust
 from scanweld.pipeline import run as pipeline
 from scanweld.pipeline import stages as steps
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
@@ -159,13 +159,13 @@ class Memory:
 
 def test_a_second_run_recomputes_nothing(monkeypatch: pytest.MonkeyPatch):
     scans, memory, calls = few(), Memory(), []
-    register = robust.register_pair
+    register = registrar.register_pair
 
     def counted(*arguments: Any) -> PairResult:
         calls.append(arguments[:2])
         return register(*arguments)
 
-    monkeypatch.setattr(robust, "register_pair", counted)
+    monkeypatch.setattr(registrar, "register_pair", counted)
     first = run(scans, cache=memory)
     assert len(calls) == 6 and memory.num_put >= 6
     kept = memory.num_put

@@ -20,6 +20,7 @@ from scanweld.refinement.refine import Refinement, refine_poses, scan_rms
 from scanweld.refinement.surface_terms import surface_matches, surface_source
 from tests.prepared import scaled
 from tests.scenes import creature_scene
+from tests.view_graphs import DrawnJudge
 
 NUM_SCANS = 6
 RING = [(k, (k + 1) % NUM_SCANS) for k in range(NUM_SCANS)]
@@ -199,7 +200,9 @@ def graph_at(poses: Mapping[int, Pose]) -> ViewGraph:
         (min(edge), max(edge)): Alternative(i_from_j=Pose.identity(), evidence=evidence(agree=1.0))
         for edge in RING
     }
-    return ViewGraph(pairs={}, accepted=accepted, rejected={}, components=(component,), unplaced={})
+    return ViewGraph(
+        pairs={}, usable={}, accepted=accepted, rejected={}, components=(component,), unplaced={}
+    )
 
 
 def evidence(agree: float) -> Evidence:
@@ -224,7 +227,7 @@ def test_a_refinement_is_taken_only_if_the_evidence_does_not_suffer(is_better: b
         found = refine_poses(scans, poses, edges, RefineConfig(), matcher)
         return found.poses, scan_rms(found)
 
-    refined = refine_graph(graph, refine, judge)
+    refined = refine_graph(graph, refine, DrawnJudge(says=judge))
     poses = refined.components[0].poses
     np.testing.assert_allclose(poses[1].matrix(), np.eye(4), atol=1e-12)
     if not is_better:

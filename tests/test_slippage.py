@@ -201,7 +201,7 @@ def test_noise_of_a_quarter_percent_hides_no_sliding_pair(name: str):
     pair = rendered_pair(name, 2.5e-3, 60.0)
     anchors = [tuple(even_anchors(field, CONFIG.num_anchors) for field in pair.fields)]
     both = [(a, b) for a, b in anchors]
-    result = register_pair(0, 1, *pair.fields, both, pair.diameter, CONFIG)
+    result = register_pair(pair.problem(CONFIG), both)
     assert result.kind is PairKind.SLIDING
     assert result.sliding is not None and result.sliding.slide is RENDERED[name][0]
     assert slide_words(result.sliding.slide) in result.reason and "free to" in result.reason

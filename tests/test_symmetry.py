@@ -172,7 +172,7 @@ def test_a_gear_is_named_by_its_teeth(fold: int):
     views = [view_of(mesh, azimuth, 40, roll, pixels=120) for azimuth, roll in ((10, 0), (63, 50))]
     pair = pair_of_scene(scene_of(mesh, views, noise=MILD_NOISE), 0, 1)
     a, b = (even_anchors(field, CONFIG.num_anchors) for field in pair.fields)
-    result = register_pair(0, 1, *pair.fields, [(a, b)], pair.diameter, CONFIG)
+    result = register_pair(pair.problem(CONFIG), [(a, b)])
     assert result.kind is PairKind.AMBIGUOUS and result.symmetry is not None
     assert result.symmetry.words in result.reason
     step = 360 / fold
@@ -181,7 +181,7 @@ def test_a_gear_is_named_by_its_teeth(fold: int):
     best = weights_of(result.alternatives, CONFIG.min_margin, CONFIG.min_score)[0]
     assert best < 0.7
     # Turns that explain the scans as well are kept, even if they are more than usual.
-    told = (*result.alternatives, *result.tied_too)
+    told = (*result.alternatives, *result.further_ties)
     turns = [option.i_from_j.inverse() @ pair.i_from_j for option in told]
     nearest = {round(turn.angle_deg() / step) for turn in turns if is_turn_by(step, turn)}
     assert len(nearest) >= fold // 2
@@ -216,8 +216,10 @@ def pair_result(
 
 
 def graph_of(results: Sequence[PairResult], unplaced: Sequence[int]) -> ViewGraph:
+    pairs = {(result.i, result.j): result for result in results}
     return ViewGraph(
-        pairs={(result.i, result.j): result for result in results},
+        pairs=pairs,
+        usable=pairs,
         accepted={},
         rejected={},
         components=(),

@@ -1,15 +1,18 @@
 """Worlds of scans, pairs drawn from them, and what must hold of their view graphs."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scanweld.config import GraphConfig
 from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.judge import PairJudge, Poses
+from scanweld.evidence.patches import PixelConsensus
 from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.assemble import build_view_graph
-from scanweld.graph.merge import Judge
+from scanweld.graph.problem import GraphProblem, Settle
 from scanweld.graph.reasons import find_doubts
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
@@ -19,6 +22,35 @@ SAME_DEG, SAME_SHIFT = 2.5, 0.03
 GOOD, WEAK = 0.4, 0.09
 DENIED = Evidence(agree=0.1, front=0.2, contradict=0.0, free=0.1, occluded=0.5, unknown=0.1)
 Pairs = dict[Edge, PairResult]
+Say = Callable[[int, int, Pose], Evidence]
+SAME = PoseTolerance(angle_deg=5.0, shift=0.03)
+NOWHERE = np.zeros((4, 4), dtype=bool)
+SILENT = PixelConsensus(agrees=NOWHERE, violates=NOWHERE, in_free_space=NOWHERE, max_pixels=1.0)
+
+
+def nothing_seen(a: Poses, b: Poses) -> list[PixelConsensus]:
+    return [SILENT] * (len(a) + len(b))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnJudge:
+    """A judge that says what is drawn; off edges the same unless something else is."""
+
+    says: Say
+    says_off_edges: Say | None = None
+    sees: Callable[[Poses, Poses], list[PixelConsensus]] = nothing_seen
+
+    def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
+        return self.says(i, j, i_from_j)
+
+    def poses(self, i: int, j: int, i_from_j: Sequence[Pose]) -> list[Evidence]:
+        return [self.says(i, j, pose) for pose in i_from_j]
+
+    def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
+        return (self.says_off_edges or self.says)(i, j, i_from_j)
+
+    def pixels(self, a: Poses, b: Poses) -> list[PixelConsensus]:
+        return self.sees(a, b)
 
 
 def world_of(num_scans: int, seed: int = 0) -> list[Pose]:
@@ -98,7 +130,7 @@ def is_same(p: Pose, q: Pose) -> bool:
     return apart.angle_deg() < SAME_DEG and apart.shift_at(CENTRE) < SAME_SHIFT
 
 
-def judge_of(world: Sequence[Pose], pairs: Pairs, denied: Evidence = DENIED) -> Judge:
+def judge_of(world: Sequence[Pose], pairs: Pairs, denied: Evidence = DENIED) -> DrawnJudge:
     """Believes what the pairs believe, and the truth; denies everything else."""
 
     def judge(i: int, j: int, i_from_j: Pose) -> Evidence:
@@ -109,24 +141,40 @@ def judge_of(world: Sequence[Pose], pairs: Pairs, denied: Evidence = DENIED) -> 
                 return known.evidence
         return seen(0.0) if is_same(true_pose(world, i, j), i_from_j) else denied
 
-    return judge
+    return DrawnJudge(says=judge)
 
 
-def stay(poses: Mapping[int, Pose]) -> Mapping[int, Pose]:
+def stay(poses: Poses) -> Poses:
     return poses
+
+
+def problem_of(
+    num_scans: int,
+    pairs: Pairs,
+    judge: PairJudge,
+    settle: Settle = stay,
+    apart: Collection[Edge] = (),
+) -> GraphProblem:
+    return GraphProblem(
+        pairs=pairs,
+        centres=[CENTRE] * num_scans,
+        same=SAME,
+        judge=judge,
+        settle=settle,
+        config=GraphConfig(),
+        apart=apart,
+    )
 
 
 def graph_of(
     world: Sequence[Pose],
     pairs: Pairs,
-    judge: Judge | None = None,
-    settle: Callable[[Mapping[int, Pose]], Mapping[int, Pose]] = stay,
+    judge: PairJudge | None = None,
+    settle: Settle = stay,
 ) -> ViewGraph:
     judge = judge or judge_of(world, pairs)
-    centres = [CENTRE] * len(world)
-    config = GraphConfig()
-    graph = build_view_graph(len(world), pairs, centres, 1.0, judge, settle, config)
-    graph = replace(graph, doubts=find_doubts(graph, judge, config))
+    graph = build_view_graph(problem_of(len(world), pairs, judge, settle))
+    graph = replace(graph, doubts=find_doubts(graph, judge, GraphConfig()))
     assert_sound(graph, len(world), pairs)
     return graph
 

@@ -97,6 +97,11 @@ class PairsConfig(Section):
     """Smallest over largest eigenvalue of the information that noise cannot feign, below which a
     pose slides."""
 
+    @property
+    def fine_tolerance_diameters(self) -> float:
+        """Depth tolerance of the evidence on answers."""
+        return self.tolerance_diameters[2]
+
 
 class CoarseConfig(Section):
     """Coarse registration as published (paper 3.1), for the method "paper" only.

@@ -4,22 +4,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from scanweld.confidence.diagnostics import PairDiagnostics
 from scanweld.confidence.grounds import (
     LEAST_OBSERVABILITY,
     Grounds,
-    is_supported,
+    is_corroborated,
     pair_grounds,
     scan_grounds,
 )
 from scanweld.confidence.joint_evidence import JointEvidence, joint_evidence
-from scanweld.confidence.links import links
 from scanweld.confidence.model import Calibration
-from scanweld.confidence.witnesses import Witnesses
+from scanweld.confidence.ties import ties_of
 from scanweld.config import Config
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 
-OPEN = 0.49
+MAX_UNDECIDED_CONFIDENCE = 0.49
 """Most confidence in a pose that what was seen leaves open: it slides, another fits as well, or too
 little speaks for it."""
 MIN_COHERENT_SCORE = 0.0
@@ -43,47 +43,47 @@ class Confidence:
 
 
 def assess(
-    graph: ViewGraph, witnesses: Witnesses, calibration: Calibration, config: Config
+    graph: ViewGraph, diagnostics: PairDiagnostics, calibration: Calibration, config: Config
 ) -> Confidence:
     """Give every pair that has a pose, and every placed scan, its confidence.
 
     Args:
         graph: The view graph with its final poses.
-        witnesses: All scans of the run.
+        diagnostics: All scans of the run.
         calibration: The models.
         config: Settings: what leaves a pose open.
     """
     homes: dict[int, JointEvidence] = {}
     for component in graph.components:
-        joint = joint_evidence(graph, component, witnesses)
+        joint = joint_evidence(graph, component, diagnostics)
         homes.update(dict.fromkeys(component.poses, joint))
     pairs = {
-        edge: _assess_pair(result, chosen, graph, homes, witnesses, calibration, config)
+        edge: _assess_pair(result, chosen, graph, homes, diagnostics, calibration, config)
         for edge, result in graph.pairs.items()
         if (chosen := graph.accepted.get(edge) or result.best) is not None
     }
     return Confidence(pairs=pairs, scans=_assess_scans(graph, homes, pairs, calibration, config))
 
 
-def close_open(probability: float, pair: PairResult, grounds: Grounds, config: Config) -> float:
-    """A pair's probability, at most ``OPEN`` if it is not sure alone and nothing else decides.
+def cap_undecided(probability: float, pair: PairResult, grounds: Grounds, config: Config) -> float:
+    """A pair's probability, capped if the pair is not sure alone and nothing else decides.
 
     A good pair that only its ICP holds is not sure alone.
     """
     is_firm = pair.observability >= config.pairs.min_observability
     if pair.kind is PairKind.GOOD and is_firm:
         return probability
-    is_decided = is_supported(grounds["support"]) and not _is_open(grounds, config)
-    return probability if is_decided else min(probability, OPEN)
+    is_decided = is_corroborated(grounds["support"]) and not _is_open(grounds, config)
+    return probability if is_decided else min(probability, MAX_UNDECIDED_CONFIDENCE)
 
 
-def as_held(probability: float, grounds: Grounds, config: Config) -> float:
+def cap_by_links(probability: float, grounds: Grounds, config: Config) -> float:
     """A scan's probability, at most that of what ties it to the others.
 
-    At most ``OPEN`` if all others together leave its place open.
+    At most ``MAX_UNDECIDED_CONFIDENCE`` if all others together leave its place open.
     """
     tied = min(probability, 1.0 - math.exp(-grounds["link"]))
-    return min(tied, OPEN) if _is_open(grounds, config) else tied
+    return min(tied, MAX_UNDECIDED_CONFIDENCE) if _is_open(grounds, config) else tied
 
 
 def _is_open(grounds: Grounds, config: Config) -> bool:
@@ -97,7 +97,7 @@ def _assess_pair(
     chosen: Alternative,
     graph: ViewGraph,
     homes: Mapping[int, JointEvidence],
-    witnesses: Witnesses,
+    diagnostics: PairDiagnostics,
     calibration: Calibration,
     config: Config,
 ) -> Assessed:
@@ -106,13 +106,13 @@ def _assess_pair(
     if joint is not homes.get(result.j):
         joint = None
     at_contours = is_accepted or chosen.score > MIN_COHERENT_SCORE
-    looks = witnesses.look(result.i, result.j, chosen.i_from_j, at_contours=at_contours)
-    grounds = pair_grounds(result, chosen, looks, joint, is_accepted)
+    fit = diagnostics.fit(result.i, result.j, chosen.i_from_j, at_contours=at_contours)
+    grounds = pair_grounds(result, chosen, fit, joint, is_accepted)
     probability = calibration.pair.probability(grounds)
     if (result.i, result.j) not in graph.remarks:
-        probability = close_open(probability, result, grounds, config)
-    if result.is_marked:
-        probability = min(probability, OPEN)
+        probability = cap_undecided(probability, result, grounds, config)
+    if result.rests_on_feature:
+        probability = min(probability, MAX_UNDECIDED_CONFIDENCE)
     return Assessed(confidence=probability, grounds=grounds)
 
 
@@ -126,10 +126,10 @@ def _assess_scans(
     accepted = {edge: pairs[edge] for edge in graph.accepted}
     scans: dict[int, Assessed] = {}
     for component in graph.components:
-        tied = links(component, {edge: pair.confidence for edge, pair in accepted.items()})
+        tied = ties_of(component, {edge: pair.confidence for edge, pair in accepted.items()})
         for k in sorted(component.poses):
             own = [pair.grounds["coherence"] for edge, pair in accepted.items() if k in edge]
             grounds = scan_grounds(k, homes[k], tied[k], max(own, default=0.0))
-            confidence = as_held(calibration.scan.probability(grounds), grounds, config)
+            confidence = cap_by_links(calibration.scan.probability(grounds), grounds, config)
             scans[k] = Assessed(confidence=confidence, grounds=grounds)
     return scans

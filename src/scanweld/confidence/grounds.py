@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from scanweld.confidence.diagnostics import Fit
 from scanweld.confidence.joint_evidence import JointEvidence
-from scanweld.confidence.witnesses import Looks
 from scanweld.evidence.evidence import Evidence
 from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
 
@@ -17,14 +17,14 @@ Grounds = Mapping[str, float]
 LEAST_SHARE = 1e-3
 LEAST_OBSERVABILITY = 1e-7
 MAX_MISFIT = 2.0
-MIN_SUPPORT = 0.02
+MIN_CORROBORATION = 0.02
 """Conductance between two scans below which other pairs do not hold them together."""
 
 
 def pair_grounds(
     result: PairResult,
     chosen: Alternative,
-    looks: Looks,
+    fit: Fit,
     joint: JointEvidence | None,
     is_accepted: bool,
 ) -> Grounds:
@@ -36,32 +36,32 @@ def pair_grounds(
     Args:
         result: The pair.
         chosen: The pose.
-        looks: How the two scans lie on each other in it.
+        fit: How the two scans lie on each other in it.
         joint: The component that both scans are in, if they are in one.
         is_accepted: Whether the pose agrees with the component's.
     """
-    observability = looks.observability
+    observability = fit.observability
     margin = margin_among(chosen, result.alternatives)
     refutation = refutation_among(chosen, result.alternatives)
     support = opposition = consent = 0.0
     if joint is not None and not is_accepted:
         opposition = -joint.conductance[result.i, result.j]
     if joint is not None and is_accepted:
-        support = joint.support_besides((result.i, result.j), chosen.score)
+        support = joint.conductance_without((result.i, result.j), chosen.score)
         consent = -max(violated(joint.said_of(k)) for k in (result.i, result.j))
-        if is_supported(support):
+        if is_corroborated(support):
             both = result.i, result.j
             margin = max(margin, min(joint.margins[k] for k in both))
             refutation = max(refutation, min(joint.refutations[k] for k in both))
-            observability = max(observability, min(joint.looks[k].observability for k in both))
+            observability = max(observability, min(joint.fits[k].observability for k in both))
     return {
         **_of_evidence(chosen.evidence),
         "margin": max(margin, -1.0),
         "refutation": refutation,
         "observability": float(np.log10(max(observability, LEAST_OBSERVABILITY))),
-        "coherence": looks.coherence,
-        "residual": -looks.residual,
-        "misfit": -min(looks.misfit, MAX_MISFIT),
+        "coherence": fit.coherence,
+        "residual": -fit.residual,
+        "misfit": -min(fit.misfit, MAX_MISFIT),
         "support": support,
         "opposition": opposition,
         "consent": consent,
@@ -77,7 +77,7 @@ def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) ->
         link: How surely pairs tie it to the reference scan.
         coherence: The best contour coherence of its accepted pairs.
     """
-    said, looks = joint.said_of(k), joint.looks[k]
+    said, fit = joint.said_of(k), joint.fits[k]
     agree = sum(e.agree for e in said)
     return {
         "agree": float(np.log10(max(agree, LEAST_SHARE))),
@@ -85,17 +85,17 @@ def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) ->
         "free": -sum(e.free for e in said) / max(agree, LEAST_SHARE),
         "margin": joint.margins[k],
         "refutation": joint.refutations[k],
-        "observability": float(np.log10(max(looks.observability, LEAST_OBSERVABILITY))),
+        "observability": float(np.log10(max(fit.observability, LEAST_OBSERVABILITY))),
         "coherence": coherence,
-        "residual": -looks.residual,
-        "misfit": -min(looks.misfit, MAX_MISFIT),
+        "residual": -fit.residual,
+        "misfit": -min(fit.misfit, MAX_MISFIT),
         "link": link,
     }
 
 
-def is_supported(support: float) -> bool:
+def is_corroborated(support: float) -> bool:
     """Whether other accepted pairs hold the two scans of a pair together."""
-    return support > MIN_SUPPORT
+    return support > MIN_CORROBORATION
 
 
 def violated(said: list[Evidence]) -> float:

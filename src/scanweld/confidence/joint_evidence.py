@@ -6,12 +6,13 @@ from itertools import combinations
 
 import numpy as np
 
+from scanweld.confidence.diagnostics import Fit, PairDiagnostics, over
 from scanweld.confidence.misfit import misfit, two_way_offsets
-from scanweld.confidence.witnesses import Looks, Witnesses, over
 from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.evidence.information import information_from, observability_of, two_way_matches
+from scanweld.evidence.judge import Poses
 from scanweld.evidence.rivals import (
-    MIN_TOLD_SHARE,
+    MIN_REFUTED_RIVAL_SHARE,
     RIVAL_ANGLE_DEG,
     RIVAL_SHIFT_DIAMETERS,
     as_rival,
@@ -19,7 +20,8 @@ from scanweld.evidence.rivals import (
     refutation,
 )
 from scanweld.geometry.pose import Pose
-from scanweld.graph.merge import Merge, Poses, is_near, propose_merges
+from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.graph.merge import Merge, propose_merges
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 
 MIN_CONDUCTANCE = 0.02
@@ -37,7 +39,7 @@ class JointEvidence:
         margins: For each scan, the share of the score of its place by which that beats the best
             distinct place that any pair proposes for it, as all others judge it.
         refutations: For each scan, how clearly such places are refuted.
-        looks: How each scan lies on all others together; their coherence is left to pairs.
+        fits: How each scan lies on all others together; their coherence is left to pairs.
         conductance: Between any two scans through accepted pairs, each of which conducts by its
             score: a short way, a strong way and many ways are all better.
     """
@@ -45,10 +47,10 @@ class JointEvidence:
     between: Mapping[Edge, Evidence]
     margins: Mapping[int, float]
     refutations: Mapping[int, float]
-    looks: Mapping[int, Looks]
+    fits: Mapping[int, Fit]
     conductance: Mapping[Edge, float]
 
-    def support_besides(self, edge: Edge, score: float) -> float:
+    def conductance_without(self, edge: Edge, score: float) -> float:
         """Conductance between the scans of an accepted pair of that score without the pair."""
         return max(self.conductance[edge] - max(score, MIN_CONDUCTANCE), 0.0)
 
@@ -57,25 +59,27 @@ class JointEvidence:
         return _said_of(scan, self.between)
 
 
-def joint_evidence(graph: ViewGraph, component: Component, witnesses: Witnesses) -> JointEvidence:
+def joint_evidence(
+    graph: ViewGraph, component: Component, diagnostics: PairDiagnostics
+) -> JointEvidence:
     """Ask all scans of a component about each of them.
 
     Args:
         graph: The view graph.
         component: One of its components.
-        witnesses: All scans of the run.
+        diagnostics: All scans of the run.
     """
     poses = component.poses
     between = {
-        (i, j): witnesses.judge(i, j, poses[i].inverse() @ poses[j])
+        (i, j): diagnostics.judge.pair(i, j, poses[i].inverse() @ poses[j])
         for i, j in combinations(sorted(poses), 2)
     }
-    standings = {k: _standing(k, graph, poses, between, witnesses) for k in sorted(poses)}
+    standings = {k: _standing(k, graph, poses, between, diagnostics) for k in sorted(poses)}
     return JointEvidence(
         between=between,
         margins={k: standing.margin for k, standing in standings.items()},
         refutations={k: standing.refutation for k, standing in standings.items()},
-        looks={k: _looks(k, poses, witnesses) for k in sorted(poses)},
+        fits={k: _fit(k, poses, diagnostics) for k in sorted(poses)},
         conductance=_conductance(graph, component),
     )
 
@@ -89,30 +93,34 @@ class _Standing:
 
 
 def _standing(
-    k: int, graph: ViewGraph, poses: Poses, between: Mapping[Edge, Evidence], witnesses: Witnesses
+    k: int,
+    graph: ViewGraph,
+    poses: Poses,
+    between: Mapping[Edge, Evidence],
+    diagnostics: PairDiagnostics,
 ) -> _Standing:
     """The place of a scan beside other places, all other scans being where they are."""
     others = {m: pose for m, pose in poses.items() if m != k}
-    centres = [field.centre for field in witnesses.fields]
-    near = (RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS * witnesses.diameter)
+    judge = diagnostics.judge
+    same = PoseTolerance(angle_deg=RIVAL_ANGLE_DEG, shift=RIVAL_SHIFT_DIAMETERS * judge.diameter)
     alone = {k: Pose.identity()}
-    merges = propose_merges(others, alone, graph.pairs, centres, near, witnesses.judge)
+    merges = propose_merges(others, alone, graph.pairs, judge.centres, same, judge)
     said = _said_of(k, between)
     here = Merge(
         a_from_b=poses[k],
-        supports=(),
+        proposals=(),
         agree=sum(e.agree for e in said),
         violated=sum(e.surface_violation for e in said),
         free=sum(e.free for e in said),
         worst=0.0,
     )
-    rivals = [m for m in merges if not is_near(m.a_from_b, poses[k], centres[k], near)]
+    rivals = [m for m in merges if not same.covers(m.a_from_b, poses[k], judge.centres[k])]
     scores = [
         as_rival(rival.score, (rival.agree, here.agree), (_violated(rival), _violated(here)))
         for rival in rivals
     ]
     margin = margin_over(here.score, scores)
-    least = max(MIN_AGREE, MIN_TOLD_SHARE * here.agree)
+    least = max(MIN_AGREE, MIN_REFUTED_RIVAL_SHARE * here.agree)
     return _Standing(
         margin=max(margin, -1.0),
         refutation=refutation([_violated(rival) for rival in rivals if rival.agree >= least]),
@@ -127,10 +135,10 @@ def _said_of(scan: int, between: Mapping[Edge, Evidence]) -> list[Evidence]:
     return [evidence for edge, evidence in between.items() if scan in edge]
 
 
-def _looks(k: int, poses: Poses, witnesses: Witnesses) -> Looks:
+def _fit(k: int, poses: Poses, diagnostics: PairDiagnostics) -> Fit:
     """How a scan lies on all others together."""
-    fields, sources = witnesses.fields, witnesses.sources
-    tolerance, diameter = witnesses.tolerance, witnesses.diameter
+    judge, sources = diagnostics.judge, diagnostics.sources
+    fields, tolerance, diameter = judge.fields, judge.tolerance, judge.diameter
     k_from = {m: poses[k].inverse() @ pose for m, pose in sorted(poses.items()) if m != k}
     found = [two_way_matches(fields[k], fields[m], pose, tolerance) for m, pose in k_from.items()]
     information, rms, _ = information_from(found, diameter)
@@ -138,7 +146,7 @@ def _looks(k: int, poses: Poses, witnesses: Witnesses) -> Looks:
         two_way_offsets(sources[k], sources[m], pose, tolerance, diameter)
         for m, pose in k_from.items()
     ]
-    return Looks(
+    return Fit(
         observability=observability_of(information),
         residual=over(rms, tolerance),
         misfit=misfit(np.concatenate(patches)) / tolerance,

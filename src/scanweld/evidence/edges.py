@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
-from scanweld.evidence.visibility import judge, mean_evidence
+from scanweld.evidence.visibility import mean_evidence, two_way_evidence
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind
@@ -43,7 +43,7 @@ def with_wide_edges(field: ScanField, reach: float) -> ScanField:
     return replace(field, raster=raster)
 
 
-def judge_off_edges(
+def evidence_off_edges(
     i: tuple[ScanField, ScanField],
     j: tuple[ScanField, ScanField],
     i_from_j: Pose,
@@ -60,7 +60,8 @@ def judge_off_edges(
         max_samples: Samples of each scan that are asked about, at most.
     """
     strict, off_edges = (
-        mean_evidence(*judge(i[k], j[k], i_from_j, tolerance, max_samples)) for k in (0, 1)
+        mean_evidence(*two_way_evidence(i[k], j[k], i_from_j, tolerance, max_samples))
+        for k in (0, 1)
     )
     forgiven = strict.front - off_edges.front
     return replace(strict, front=off_edges.front, unknown=strict.unknown + forgiven)

@@ -21,41 +21,41 @@ MIN_PATCH_PIXELS = 8
 """Pixels that hang together and all say the same, at least, to be told from chance."""
 MAJORITY = 0.6
 """Share of the 3 x 3 pixels around one that must say the same: strips along edges are too thin."""
-MIN_MARK_PIXELS = 10
+MIN_FEATURE_PIXELS = 10
 """Pixels in such patches that refute a pose, or make a mark, at least."""
 MAX_REVERSE = 0.1
 """Share of them that may speak against the other pose; share of a mark that a rival may show."""
-MIN_PAST_PIXELS = 30
+MIN_FREE_SPACE_PIXELS = 30
 """Pixels in patches that sensors look past refute a pose: outlines err by more than surfaces."""
-MAX_PAST_REVERSE = 0.3
+MAX_FREE_SPACE_REVERSE = 0.3
 """Share of them that sensors may look past in the other pose."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Told:
+class PixelConsensus:
     """What the sensors of several scans say of all pixels of another one.
 
     Attributes:
         agrees: (H, W) pixels that lie on the surface that any of them saw, and before none.
         violates: (H, W) pixels of patches that lie before the surface that any of them saw.
-        past: (H, W) pixels of patches where any of them looked past the object.
+        in_free_space: (H, W) pixels of patches where any of them looked past the object.
         max_pixels: So many may a mark and what it comes to lie on have.
     """
 
     agrees: BoolArray
     violates: BoolArray
-    past: BoolArray
+    in_free_space: BoolArray
     max_pixels: float
 
 
-def told_of(seen: Sequence[Seen], tolerance: float) -> Told:
+def pixel_consensus(seen: Sequence[Seen], tolerance: float) -> PixelConsensus:
     """Sum up what several sensors say of the pixels of one scan."""
     violates = np.any([one.behind < -tolerance for one in seen], axis=0)
     agree = np.any([agrees(one.behind, tolerance) for one in seen], axis=0)
-    return Told(
+    return PixelConsensus(
         agrees=agree & ~violates,
         violates=coherent(violates),
-        past=coherent(np.any([one.past for one in seen], axis=0)),
+        in_free_space=coherent(np.any([one.in_free_space for one in seen], axis=0)),
         max_pixels=seen[0].max_pixels,
     )
 
@@ -77,21 +77,24 @@ def coherent(said: BoolArray) -> BoolArray:
     return is_large[labels]
 
 
-def is_refuted_jointly(rival: Sequence[Told], pose: Sequence[Told]) -> bool:
+def is_refuted_jointly(rival: Sequence[PixelConsensus], pose: Sequence[PixelConsensus]) -> bool:
     """Whether patches of pixels of any scans speak for their poses and against rival ones."""
     against = _against(rival, pose)
-    if against < MIN_MARK_PIXELS:
+    if against < MIN_FEATURE_PIXELS:
         return False
     return reverse(rival, pose) <= MAX_REVERSE * against
 
 
-def is_looked_past(rival: Sequence[Told], pose: Sequence[Told]) -> bool:
+def violates_free_space(rival: Sequence[PixelConsensus], pose: Sequence[PixelConsensus]) -> bool:
     """Whether sensors look past pixels of any scans in rival poses, and far fewer in a pose."""
-    against = _num_past(rival, pose)
-    return against >= MIN_PAST_PIXELS and _num_past(pose, rival) <= MAX_PAST_REVERSE * against
+    against = _num_in_free_space(rival, pose)
+    return (
+        against >= MIN_FREE_SPACE_PIXELS
+        and _num_in_free_space(pose, rival) <= MAX_FREE_SPACE_REVERSE * against
+    )
 
 
-def _against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
+def _against(rival: Sequence[PixelConsensus], pose: Sequence[PixelConsensus]) -> int:
     """Pixels of patches that are contradicted in a rival and agreed with in a pose.
 
     They must be few enough, in each scan, to be a mark: else the poses differ all over.
@@ -103,13 +106,16 @@ def _against(rival: Sequence[Told], pose: Sequence[Told]) -> int:
     return sum(counts) if is_small else 0
 
 
-def reverse(rival: Sequence[Told], pose: Sequence[Told]) -> int:
+def reverse(rival: Sequence[PixelConsensus], pose: Sequence[PixelConsensus]) -> int:
     """Pixels of patches that are contradicted in a pose and not in its rival."""
     return sum(
         int(np.count_nonzero(a.violates & ~b.violates)) for b, a in zip(rival, pose, strict=True)
     )
 
 
-def _num_past(pose: Sequence[Told], other: Sequence[Told]) -> int:
+def _num_in_free_space(pose: Sequence[PixelConsensus], other: Sequence[PixelConsensus]) -> int:
     """Pixels of patches that sensors look past in a pose and not in the other."""
-    return sum(int(np.count_nonzero(a.past & ~b.past)) for a, b in zip(pose, other, strict=True))
+    return sum(
+        int(np.count_nonzero(a.in_free_space & ~b.in_free_space))
+        for a, b in zip(pose, other, strict=True)
+    )

@@ -14,9 +14,9 @@ from scanweld.geometry.prepared import PixelKind
 
 JUMP_PIXELS = 6.0
 """Depths of four neighbouring pixels that differ by more, in footprints, make no surface."""
-MAX_MARK_AREA = 0.02
+MAX_FEATURE_AREA = 0.02
 """Of a mark and what it comes to lie on, in squared diameters."""
-PAST_PIXELS = 1
+FREE_MARGIN_PIXELS = 1
 """All pixels so near are free where a sensor looks past the object: outlines are a pixel off."""
 MIN_FACING = 0.1
 """Cosine of incidence below which a sensor may miss a surface instead of looking past it."""
@@ -31,13 +31,13 @@ class Seen:
     Attributes:
         behind: (H, W) distance behind the other scan's surface; NaN without a say.
         lands: (H, W) index of the pixel that they fall on; -1 without a say.
-        past: (H, W) pixels where the other sensor looked past the object.
+        in_free_space: (H, W) pixels where the other sensor looked past the object.
         max_pixels: So many may a mark and what it comes to lie on have in this scan.
     """
 
     behind: NDArray[np.float32]
     lands: NDArray[np.int32]
-    past: BoolArray
+    in_free_space: BoolArray
     max_pixels: float
 
 
@@ -51,15 +51,25 @@ def see(i: ScanField, j: ScanField, i_from_j: Pose, diameter: float) -> TwoWay:
     of_i = _seen(i.camera, i.raster, j.camera, j.raster, backward)
     of_j = _seen(j.camera, j.raster, i.camera, i.raster, forward)
     return (
-        Seen(behind=of_i[0], lands=of_i[1], past=of_i[2], max_pixels=_max_pixels(i, diameter)),
-        Seen(behind=of_j[0], lands=of_j[1], past=of_j[2], max_pixels=_max_pixels(j, diameter)),
+        Seen(
+            behind=of_i[0],
+            lands=of_i[1],
+            in_free_space=of_i[2],
+            max_pixels=_max_pixels(i, diameter),
+        ),
+        Seen(
+            behind=of_j[0],
+            lands=of_j[1],
+            in_free_space=of_j[2],
+            max_pixels=_max_pixels(j, diameter),
+        ),
     )
 
 
 def _max_pixels(scan: ScanField, diameter: float) -> float:
     """How many of a scan's pixels the largest mark and what it lies on may have."""
     footprint = (scan.centre[2] if scan.camera[0] == 0.0 else 1.0) / scan.camera[1]
-    return float(MAX_MARK_AREA * (diameter / footprint) ** 2)
+    return float(MAX_FEATURE_AREA * (diameter / footprint) ** 2)
 
 
 def fallen_on(seen: Seen, mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
@@ -82,7 +92,7 @@ def _seen(
     rows, columns = raster_to.shape[0], raster_to.shape[1]
     behind = np.full((height, width), np.nan, dtype=np.float32)
     lands = np.full((height, width), -1, dtype=np.int32)
-    past = np.zeros((height, width), dtype=np.bool_)
+    in_free_space = np.zeros((height, width), dtype=np.bool_)
     is_pinhole = camera_to[0] == 0.0
     for r in range(height):
         for c in range(width):
@@ -103,7 +113,9 @@ def _seen(
             if not (0.0 <= u < columns - 1.0 and 0.0 <= v < rows - 1.0):
                 continue
             if _is_free_around(raster_to, int(v), int(u)):
-                past[r, c] = _facing(raster_from, r, c, pose, (x, y, z), is_pinhole) > MIN_FACING
+                in_free_space[r, c] = (
+                    _facing(raster_from, r, c, pose, (x, y, z), is_pinhole) > MIN_FACING
+                )
                 continue
             surface = _surface_at(raster_to, u, v, 1.0 / camera_to[1], is_pinhole)
             if np.isnan(surface):
@@ -116,7 +128,7 @@ def _seen(
             tilt = abs(nx * x + ny * y + nz * z) / z if is_pinhole else abs(nz)
             behind[r, c] = (z - surface) * min(tilt, 1.0)
             lands[r, c] = p * columns + q
-    return behind, lands, past
+    return behind, lands, in_free_space
 
 
 @njit(cache=True, nogil=True)
@@ -142,8 +154,8 @@ def _surface_at(
 @njit(cache=True, nogil=True)
 def _is_free_around(raster: NDArray[np.float32], row: int, column: int) -> bool:
     """Whether all pixels are free near the four of which the given one is the first."""
-    for p in range(row - PAST_PIXELS, row + PAST_PIXELS + 2):
-        for q in range(column - PAST_PIXELS, column + PAST_PIXELS + 2):
+    for p in range(row - FREE_MARGIN_PIXELS, row + FREE_MARGIN_PIXELS + 2):
+        for q in range(column - FREE_MARGIN_PIXELS, column + FREE_MARGIN_PIXELS + 2):
             if not (0 <= p < raster.shape[0] and 0 <= q < raster.shape[1]):
                 return False
             if raster[p, q, RASTER_KIND] != IS_FREE:

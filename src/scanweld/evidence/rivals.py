@@ -6,12 +6,12 @@ RIVAL_ANGLE_DEG = 12.0
 """Two poses that differ by less than this are the same answer, not rivals,"""
 RIVAL_SHIFT_DIAMETERS = 0.06
 """if they also put the middle of a scan to within this of each other."""
-CLEAN_SHARE, AS_CLEAN = 0.15, 1.3
+CLEAN_SHARE, VIOLATION_RATIO = 0.15, 1.3
 """A rival is contradicted no more than a pose if its violations, as a share of what agrees, are
 within the first, or within so many times those of the pose."""
 MIN_RIVAL_SHARE = 0.35
 """Least agreement of such a rival, as a share of that of the pose: slivers fit in many ways."""
-MIN_TOLD_SHARE = 0.15
+MIN_REFUTED_RIVAL_SHARE = 0.15
 """The same of a rival of which one wants to know how much contradicts it."""
 
 
@@ -33,7 +33,7 @@ def as_rival(score: float, agree: tuple[float, float], violated: tuple[float, fl
         agree: What agrees, in the rival and in the best place.
         violated: Violations as a share of that, likewise.
     """
-    bearable = max(CLEAN_SHARE, AS_CLEAN * violated[1])
+    bearable = max(CLEAN_SHARE, VIOLATION_RATIO * violated[1])
     if agree[0] <= MIN_RIVAL_SHARE * agree[1] or violated[0] > bearable:
         return score
     return score * max(1.0, agree[1] / agree[0])

@@ -1,5 +1,7 @@
 """Visibility evidence: what each scan's sensor says of the other scan's samples."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -25,7 +27,7 @@ CONTRADICT_COSINE = 0.3
 """and below which they contradict each other; between the two they say nothing."""
 
 
-def judge(
+def two_way_evidence(
     i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float, max_samples: int = 10**9
 ) -> tuple[Evidence, Evidence]:
     """Evidence on a relative pose in both directions.
@@ -33,16 +35,29 @@ def judge(
     Args:
         i: First scan.
         j: Second scan.
-        i_from_j: The pose to judge, sensor frames.
+        i_from_j: The pose, between the sensor frames.
         tolerance: Depth tolerance, in the scans' unit.
         max_samples: Samples of each scan that are asked about, at most.
 
     Returns:
         What sensor j says of i's samples, and what sensor i says of j's.
     """
-    poses = pose_rows([i_from_j])
-    counts = count_evidence(*kernel_view(i), *kernel_view(j), poses, max_samples, tolerance)[0]
-    return _evidence(counts[0]), _evidence(counts[1])
+    (both,) = evidence_at_poses(i, j, [i_from_j], tolerance, max_samples)
+    return both
+
+
+def evidence_at_poses(
+    i: ScanField,
+    j: ScanField,
+    i_from_j: Sequence[Pose],
+    tolerance: float,
+    max_samples: int = 10**9,
+) -> list[tuple[Evidence, Evidence]]:
+    """The same at several poses, in one call of the kernel."""
+    counts = count_evidence(
+        *kernel_view(i), *kernel_view(j), pose_rows(i_from_j), max_samples, tolerance
+    )
+    return [(_evidence(of_i), _evidence(of_j)) for of_i, of_j in counts]
 
 
 def mean_evidence(a: Evidence, b: Evidence) -> Evidence:
@@ -51,7 +66,7 @@ def mean_evidence(a: Evidence, b: Evidence) -> Evidence:
     return Evidence(**{name: 0.5 * (getattr(a, name) + getattr(b, name)) for name in names})
 
 
-def pose_rows(poses: list[Pose]) -> FloatArray:
+def pose_rows(poses: Sequence[Pose]) -> FloatArray:
     """Poses as rows (N, 12) of a kernel: the rotation row by row, then the translation."""
     return np.array([np.r_[pose.rotation.ravel(), pose.translation] for pose in poses]).reshape(
         -1, 12

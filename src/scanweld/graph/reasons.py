@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from scanweld.config import GraphConfig
+from scanweld.evidence.judge import PairJudge
 from scanweld.evidence.slippage import Slide, slide_words
 from scanweld.geometry.arrays import FloatArray
-from scanweld.graph.merge import Judge, is_near
+from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.symmetry import fold_words
@@ -24,7 +25,7 @@ def why_rejected(
     result: PairResult,
     components: Sequence[Component],
     centres: Sequence[FloatArray],
-    near: tuple[float, float],
+    same: PoseTolerance,
 ) -> str:
     """Why a pair is not used: by its own evidence, or because the rest disagrees with it."""
     i, j = result.i, result.j
@@ -35,7 +36,7 @@ def why_rejected(
         return result.reason or "its scans could not be placed together without contradictions"
     i_from_j = home.poses[i].inverse() @ home.poses[j]
     apart = i_from_j.inverse() @ result.best.i_from_j
-    if not is_near(result.best.i_from_j, i_from_j, centres[j], near):
+    if not same.covers(result.best.i_from_j, i_from_j, centres[j]):
         told = f"cycle: {apart.angle_deg():.1f} deg off what the other pairs say"
         return f"{told}; {result.reason}" if result.reason else told
     return result.reason or f"score {result.best.score:.2f} too low to hold"
@@ -78,10 +79,10 @@ def _agreed(said: Sequence[Said]) -> tuple[Said | None, int]:
     return most, count if count >= MIN_ALIKE and 2 * count > len(said) else 0
 
 
-def _only_marked(graph: ViewGraph, component: Component) -> set[int]:
+def _rest_on_feature_alone(graph: ViewGraph, component: Component) -> set[int]:
     """Scans of a component that no good pairs join to most of it, but a mark alone."""
     inside = {edge: graph.pairs[edge] for edge in graph.accepted if edge[0] in component.poses}
-    if not any(result.is_marked for result in inside.values()):
+    if not any(result.rests_on_feature for result in inside.values()):
         return set()
     groups = [{k} for k in component.poses]
     for edge, result in inside.items():
@@ -92,11 +93,11 @@ def _only_marked(graph: ViewGraph, component: Component) -> set[int]:
     return set(component.poses) - (most if len(most) > 1 else set())
 
 
-def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int, str]:
+def find_doubts(graph: ViewGraph, judge: PairJudge, config: GraphConfig) -> dict[int, str]:
     """What speaks against the final poses of placed scans, by scan; known doubts stay."""
     doubts = dict(graph.doubts)
     for component in graph.components:
-        for k in _only_marked(graph, component):
+        for k in _rest_on_feature_alone(graph, component):
             doubts[k] = "only a small mark decides its pose: others hide the mark"
         for k in sorted(component.poses):
             share = _violated_share(k, component, judge)
@@ -110,7 +111,7 @@ def find_doubts(graph: ViewGraph, judge: Judge, config: GraphConfig) -> dict[int
     for edge in _good_but_rejected(graph):
         against = graph.pairs[edge].alternatives[0].score
         for k in edge:
-            if _support(k, graph) < OUTWEIGHED * against:
+            if _strength(k, graph) < OUTWEIGHED * against:
                 doubts.setdefault(k, "a good pair disagrees with its pose")
     return doubts
 
@@ -121,14 +122,14 @@ def doubt_alone(graph: ViewGraph) -> dict[int, str]:
     return {scans[0]: "no other scan of its component is good" for scans in sure if len(scans) == 1}
 
 
-def _support(scan: int, graph: ViewGraph) -> float:
+def _strength(scan: int, graph: ViewGraph) -> float:
     return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
 
 
-def _violated_share(scan: int, component: Component, judge: Judge) -> float:
+def _violated_share(scan: int, component: Component, judge: PairJudge) -> float:
     """Samples that speak against a scan's pose, as a share of those that agree."""
     poses = component.poses
-    evidence = [judge(scan, m, poses[scan].inverse() @ poses[m]) for m in poses if m != scan]
+    evidence = [judge.pair(scan, m, poses[scan].inverse() @ poses[m]) for m in poses if m != scan]
     agree = sum(e.agree for e in evidence)
     violated = sum(e.surface_violation for e in evidence)
     return violated / max(agree, 1e-9)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from scanweld.evidence.judge import PairJudge
 from scanweld.geometry.pose import Pose
-from scanweld.graph.merge import Judge
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 
 logger = logging.getLogger(__name__)
@@ -21,7 +21,7 @@ MAX_SCORE_LOSS = 0.03
 """Mean score that a refinement may cost: it is judged by few samples."""
 
 
-def refine_graph(graph: ViewGraph, refine: Refine, judge: Judge) -> ViewGraph:
+def refine_graph(graph: ViewGraph, refine: Refine, judge: PairJudge) -> ViewGraph:
     """Refine the poses of each component together (paper 3.2); the evidence is the judge.
 
     A component whose accepted pairs would lose by it keeps its poses, has no residuals, and its
@@ -51,6 +51,6 @@ def refine_graph(graph: ViewGraph, refine: Refine, judge: Judge) -> ViewGraph:
     return replace(graph, components=tuple(components), rms=rms, doubts=doubts)
 
 
-def _mean_score(poses: Mapping[int, Pose], edges: Sequence[Edge], judge: Judge) -> float:
-    scores = [judge(i, j, poses[i].inverse() @ poses[j]).score for i, j in edges]
+def _mean_score(poses: Mapping[int, Pose], edges: Sequence[Edge], judge: PairJudge) -> float:
+    scores = [judge.pair(i, j, poses[i].inverse() @ poses[j]).score for i, j in edges]
     return float(np.mean(scores)) if scores else 0.0

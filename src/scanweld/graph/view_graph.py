@@ -35,7 +35,8 @@ class ViewGraph:
     """Pairs that agree with each other, and the components they make.
 
     Attributes:
-        pairs: Results of all pairs (i, j), i < j.
+        pairs: Results of all pairs (i, j), i < j, as the search found them.
+        usable: The same as users' facts let them be used: those the graph was built from.
         accepted: The alternative of each pair that agrees with the poses.
         rejected: Why the other pairs are not used.
         components: Of at least two scans, largest first.
@@ -46,6 +47,7 @@ class ViewGraph:
     """
 
     pairs: Mapping[Edge, PairResult]
+    usable: Mapping[Edge, PairResult]
     accepted: Mapping[Edge, Alternative]
     rejected: Mapping[Edge, str]
     components: tuple[Component, ...]

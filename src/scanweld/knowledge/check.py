@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from scanweld.evidence.evidence import MIN_AGREE
+from scanweld.evidence.judge import Judge
 from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
-from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.graph.merge import Judge
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 from scanweld.io import natural_key
 from scanweld.knowledge.facts import Knowledge
-from scanweld.knowledge.given import off_axis_words
 from scanweld.knowledge.turntable import MIN_SCANS, Turntable, turning_pairs
 from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import FactReport, FactVerdict
@@ -22,22 +20,18 @@ MAX_NAMED = 5
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Outcome:
-    """What facts are checked against.
+class Registered:
+    """The scans as they were registered: what facts are checked against.
 
     Attributes:
         prepared: The scans that took part.
         graph: The view graph, refined.
-        centres: (3,) middle of each scan's samples, sensor frame.
-        diameter: Diameter of the run.
         judge: Gives the evidence on any pair at any pose.
         turntable: The common axis that was found, if it was looked for.
     """
 
     prepared: Sequence[PreparedScan]
     graph: ViewGraph
-    centres: Sequence[FloatArray]
-    diameter: float
     judge: Judge
     turntable: Turntable | None
 
@@ -57,8 +51,8 @@ class Outcome:
     def off(self, k: int, found: Pose, said: Pose) -> tuple[float, float]:
         """Angle and shift, in degrees and diameters, between two poses of a scan."""
         apart = said.inverse() @ found
-        middle = self.prepared[k].scan_from_sensor.apply(self.centres[k])
-        return apart.angle_deg(), apart.shift_at(middle) / self.diameter
+        middle = self.prepared[k].scan_from_sensor.apply(self.judge.centres[k])
+        return apart.angle_deg(), apart.shift_at(middle) / self.judge.diameter
 
     def is_off(self, k: int, found: Pose, said: Pose) -> bool:
         """Whether two poses of a scan are distinct answers."""
@@ -66,27 +60,27 @@ class Outcome:
         return angle >= RIVAL_ANGLE_DEG or shift >= RIVAL_SHIFT_DIAMETERS
 
 
-def check_facts(knowledge: Knowledge, outcome: Outcome) -> tuple[FactReport, ...]:
+def check_facts(knowledge: Knowledge, registered: Registered) -> tuple[FactReport, ...]:
     """Every fact that was given, and how it stands against what was found.
 
     Args:
         knowledge: The facts.
-        outcome: What was found.
+        registered: What was found.
     """
-    facts = [_fixed(name, knowledge, outcome) for name in knowledge.fix]
+    facts = [_fixed(name, knowledge, registered) for name in knowledge.fix]
     if knowledge.start is not None:
-        facts.append(_start(knowledge, outcome))
-    facts += [_together(pair, outcome) for pair in knowledge.together]
-    facts += [_apart(pair, outcome) for pair in knowledge.apart]
+        facts.append(_start(knowledge, registered))
+    facts += [_together(pair, registered) for pair in knowledge.together]
+    facts += [_apart(pair, registered) for pair in knowledge.apart]
     if knowledge.turntable:
-        facts.append(_turntable(outcome))
+        facts.append(_turntable(registered))
     return tuple(facts)
 
 
-def _fixed(name: str, knowledge: Knowledge, outcome: Outcome) -> FactReport:
+def _fixed(name: str, knowledge: Knowledge, registered: Registered) -> FactReport:
     fact = f"fix {name}"
-    k = outcome.index(name)
-    home = None if k is None else outcome.home(k)
+    k = registered.index(name)
+    home = None if k is None else registered.home(k)
     if k is None or home is None:
         return FactReport(fact=fact, verdict=FactVerdict.OPEN, reason=f"{name} is not placed")
     start = knowledge.start.poses if knowledge.start is not None else {}
@@ -94,10 +88,10 @@ def _fixed(name: str, knowledge: Knowledge, outcome: Outcome) -> FactReport:
     stays = "stays at its start pose" if name in start else "its frame is the world"
     if k == home.reference:
         return FactReport(fact=fact, verdict=FactVerdict.HELD, reason=f"{name}: {stays}")
-    found = outcome.world_from_scan(k, home)
-    other = outcome.prepared[home.reference].name
-    told = f"{name} is {_apart_words(*outcome.off(k, found, said))} where it should stay"
-    if outcome.is_off(k, found, said):
+    found = registered.world_from_scan(k, home)
+    other = registered.prepared[home.reference].name
+    told = f"{name} is {_apart_words(*registered.off(k, found, said))} where it should stay"
+    if registered.is_off(k, found, said):
         return FactReport(
             fact=fact,
             verdict=FactVerdict.CONTRADICTED,
@@ -110,22 +104,22 @@ def _apart_words(angle_deg: float, shift_diameters: float) -> str:
     return f"{angle_deg:.1f} deg and {shift_diameters:.1%} of the diameter from"
 
 
-def _start(knowledge: Knowledge, outcome: Outcome) -> FactReport:
+def _start(knowledge: Knowledge, registered: Registered) -> FactReport:
     """Start poses within each component of the file and of the run; the majority is the truth."""
     assert knowledge.start is not None
     said = knowledge.start.poses
     confirmed, wrong = set[int](), dict[int, tuple[float, float]]()
     for group in knowledge.start.components:
-        for home in outcome.graph.components:
-            there = [k for k in sorted(home.poses) if outcome.prepared[k].name in group]
+        for home in registered.graph.components:
+            there = [k for k in sorted(home.poses) if registered.prepared[k].name in group]
             if len(there) > 1:
-                off = _disagreeing(there, home, said, outcome)
+                off = _disagreeing(there, home, said, registered)
                 wrong.update(off)
                 confirmed.update(set(there) - set(off))
-    named = [k for k, scan in enumerate(outcome.prepared) if scan.name in said]
+    named = [k for k, scan in enumerate(registered.prepared) if scan.name in said]
     left = [k for k in named if k not in confirmed and k not in wrong]
     told = [f"{len(confirmed)} of {len(named)} start poses are borne out by the scans"]
-    names = {k: outcome.prepared[k].name for k in named}
+    names = {k: registered.prepared[k].name for k in named}
     if wrong:
         listed = [f"{names[k]} is {_apart_words(*wrong[k])} it" for k in _by_name(wrong, names)]
         told.append(_listed("wrong", listed))
@@ -136,18 +130,18 @@ def _start(knowledge: Knowledge, outcome: Outcome) -> FactReport:
 
 
 def _disagreeing(
-    there: Sequence[int], home: Component, said: Mapping[str, Pose], outcome: Outcome
+    there: Sequence[int], home: Component, said: Mapping[str, Pose], registered: Registered
 ) -> dict[int, tuple[float, float]]:
     """How far start poses are off, laid onto the component by the scan that most others suit."""
-    starts = {k: said[outcome.prepared[k].name] for k in there}
-    found = {k: outcome.world_from_scan(k, home) for k in there}
+    starts = {k: said[registered.prepared[k].name] for k in there}
+    found = {k: registered.world_from_scan(k, home) for k in there}
     best: dict[int, tuple[float, float]] | None = None
-    for anchor in sorted(there, key=lambda k: (k != home.reference, outcome.prepared[k].name)):
+    for anchor in sorted(there, key=lambda k: (k != home.reference, registered.prepared[k].name)):
         moved = found[anchor] @ starts[anchor].inverse()
         off = {
-            k: outcome.off(k, found[k], moved @ starts[k])
+            k: registered.off(k, found[k], moved @ starts[k])
             for k in there
-            if outcome.is_off(k, found[k], moved @ starts[k])
+            if registered.is_off(k, found[k], moved @ starts[k])
         }
         if best is None or len(off) < len(best):
             best = off
@@ -163,52 +157,54 @@ def _listed(what: str, items: Sequence[str]) -> str:
     return f"{what}: {', '.join(items[:MAX_NAMED])}{more}"
 
 
-def _edge(pair: tuple[str, str], outcome: Outcome) -> Edge | None:
-    i, j = (outcome.index(name) for name in pair)
+def _edge(pair: tuple[str, str], registered: Registered) -> Edge | None:
+    i, j = (registered.index(name) for name in pair)
     return None if i is None or j is None else (min(i, j), max(i, j))
 
 
-def _shared(edge: Edge, outcome: Outcome) -> float | None:
+def _shared(edge: Edge, registered: Registered) -> float | None:
     """Share of two scans' samples that agree at the final poses; None if not placed together."""
     i, j = edge
-    home = outcome.home(i)
+    home = registered.home(i)
     if home is None or j not in home.poses:
         return None
-    return outcome.judge(i, j, home.poses[i].inverse() @ home.poses[j]).agree
+    return registered.judge.pair(i, j, home.poses[i].inverse() @ home.poses[j]).agree
 
 
-def _together(pair: tuple[str, str], outcome: Outcome) -> FactReport:
-    fact, edge = f"together {pair[0]} {pair[1]}", _edge(pair, outcome)
+def _together(pair: tuple[str, str], registered: Registered) -> FactReport:
+    fact, edge = f"together {pair[0]} {pair[1]}", _edge(pair, registered)
     if edge is None:
-        return FactReport(fact=fact, verdict=FactVerdict.OPEN, reason=_no_part(pair, outcome))
-    result, shared = outcome.graph.pairs[edge], _shared(edge, outcome)
+        return FactReport(fact=fact, verdict=FactVerdict.OPEN, reason=_no_part(pair, registered))
+    result, shared = registered.graph.pairs[edge], _shared(edge, registered)
     told = f"{pair[0]} and {pair[1]}"
     if shared is None:
         refused = result.kind is PairKind.CONTRADICTED
         return FactReport(
             fact=fact,
             verdict=FactVerdict.CONTRADICTED if refused else FactVerdict.OPEN,
-            reason=f"{told} could not be placed together: {_why(edge, outcome)}",
+            reason=f"{told} could not be placed together: {_why(edge, registered)}",
         )
     seen = f"{told} are placed, and {shared:.0%} of their surfaces agree"
     verdict = FactVerdict.HELD if shared >= MIN_AGREE else FactVerdict.CONTRADICTED
     return FactReport(fact=fact, verdict=verdict, reason=seen)
 
 
-def _why(edge: Edge, outcome: Outcome) -> str:
-    return outcome.graph.rejected.get(edge) or "they are placed by other scans, in two components"
+def _why(edge: Edge, registered: Registered) -> str:
+    return (
+        registered.graph.rejected.get(edge) or "they are placed by other scans, in two components"
+    )
 
 
-def _no_part(pair: tuple[str, str], outcome: Outcome) -> str:
-    missing = next(name for name in pair if outcome.index(name) is None)
+def _no_part(pair: tuple[str, str], registered: Registered) -> str:
+    missing = next(name for name in pair if registered.index(name) is None)
     return f"{missing} takes no part"
 
 
-def _apart(pair: tuple[str, str], outcome: Outcome) -> FactReport:
-    fact, edge = f"apart {pair[0]} {pair[1]}", _edge(pair, outcome)
+def _apart(pair: tuple[str, str], registered: Registered) -> FactReport:
+    fact, edge = f"apart {pair[0]} {pair[1]}", _edge(pair, registered)
     if edge is None:
-        return FactReport(fact=fact, verdict=FactVerdict.HELD, reason=_no_part(pair, outcome))
-    result, shared = outcome.graph.pairs[edge], _shared(edge, outcome) or 0.0
+        return FactReport(fact=fact, verdict=FactVerdict.HELD, reason=_no_part(pair, registered))
+    result, shared = registered.graph.pairs[edge], _shared(edge, registered) or 0.0
     told = f"{pair[0]} and {pair[1]}"
     if shared >= MIN_AGREE:
         reason = f"{told}: {shared:.0%} of their surfaces agree where other scans place them"
@@ -219,8 +215,8 @@ def _apart(pair: tuple[str, str], outcome: Outcome) -> FactReport:
     return FactReport(fact=fact, verdict=FactVerdict.HELD, reason=f"{told} are not laid together")
 
 
-def _turntable(outcome: Outcome) -> FactReport:
-    table, good = outcome.turntable, turning_pairs(outcome.graph.pairs)
+def _turntable(registered: Registered) -> FactReport:
+    table, good = registered.turntable, turning_pairs(registered.graph.pairs)
     if table is None:
         few = len({k for edge in good for k in edge}) < MIN_SCANS
         return FactReport(
@@ -228,23 +224,23 @@ def _turntable(outcome: Outcome) -> FactReport:
             verdict=FactVerdict.OPEN if few else FactVerdict.CONTRADICTED,
             reason=f"{len(good)} good pairs turn, and no axis is common to most of their scans",
         )
-    share = table.shift / outcome.diameter
+    share = table.shift / registered.judge.diameter
     told = (
         f"{len(table.edges)} good pairs turn about one axis to within {table.angle_deg:.2f} deg "
         f"and {share:.2%} of the diameter"
     )
     off = {
         edge: result.best.i_from_j
-        for edge, result in sorted(outcome.graph.pairs.items())
+        for edge, result in sorted(registered.graph.pairs.items())
         if result.kind is PairKind.GOOD
         and result.best is not None
         and not table.allows(edge, result.best.i_from_j)
     }
     if not off:
         return FactReport(fact="turntable", verdict=FactVerdict.HELD, reason=told)
-    names = [scan.name for scan in outcome.prepared]
+    names = [scan.name for scan in registered.prepared]
     listed = [
-        f"{names[i]} - {names[j]} ({off_axis_words((i, j), pose, table)})"
+        f"{names[i]} - {names[j]} ({table.off_axis_words((i, j), pose)})"
         for (i, j), pose in off.items()
     ]
     return FactReport(

@@ -13,7 +13,7 @@ from scanweld.errors import KnowledgeError
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.io import PoseSet, natural_key, read_poses
-from scanweld.knowledge.given import Given
+from scanweld.knowledge.by_index import IndexedKnowledge
 
 Pair = tuple[str, str]
 
@@ -81,11 +81,11 @@ class Knowledge:
                 "start: has a pose for none of the scans; give poses by their names"
             )
 
-    def by_index(self, prepared: Sequence[PreparedScan]) -> Given:
+    def by_index(self, prepared: Sequence[PreparedScan]) -> IndexedKnowledge:
         """The facts about the scans that take part, by their index."""
         index = {scan.name: k for k, scan in enumerate(prepared)}
         given = self.start.poses if self.start is not None else {}
-        return Given(
+        return IndexedKnowledge(
             fixed={index[n]: given.get(n, Pose.identity()) for n in self.fix if n in index},
             starts=self._starts(prepared, index),
             together=_edges(self.together, index),

@@ -8,6 +8,7 @@ import numpy as np
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.axis import Axis, fit_axis
 from scanweld.geometry.pose import Pose
+from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 
@@ -33,7 +34,7 @@ class Turntable:
         axis: In the frame in which the sensor stood still.
         frames: Pose of each scan's sensor frame in that frame.
         centres: (3,) middle of each scan's samples, sensor frame.
-        near: Angle in degrees and shift of a middle within which a pose is on the axis.
+        same: A pose that is off by less is on the axis.
         edges: Good pairs that it rests on.
         num_scans: Scans that these hold together.
         angle_deg: Root mean square of the angles by which these are off.
@@ -43,7 +44,7 @@ class Turntable:
     axis: Axis
     frames: Sequence[Pose]
     centres: Sequence[FloatArray]
-    near: tuple[float, float]
+    same: PoseTolerance
     edges: tuple[Edge, ...] = ()
     num_scans: int = 0
     angle_deg: float = 0.0
@@ -59,14 +60,22 @@ class Turntable:
     def allows(self, edge: Edge, i_from_j: Pose) -> bool:
         """Whether a pose between sensor frames is a turn about the axis."""
         angle, shift = self.off_axis(edge, i_from_j)
-        return angle < self.near[0] and shift < self.near[1]
+        return angle < self.same.angle_deg and shift < self.same.shift
+
+    def off_axis_words(self, edge: Edge, i_from_j: Pose) -> str:
+        """That a pose is no turn about the axis, and by how much."""
+        angle, shift = self.off_axis(edge, i_from_j)
+        if angle >= self.same.angle_deg:
+            return f"off the turntable's axis by {angle:.1f} deg"
+        times = shift / self.same.shift
+        return f"off the turntable's axis: shifted {times:.1f} times what is allowed"
 
 
 def find_turntable(
     pairs: Mapping[Edge, PairResult],
     frames: Sequence[Sequence[Pose]],
     centres: Sequence[FloatArray],
-    near: tuple[float, float],
+    same: PoseTolerance,
 ) -> Turntable | None:
     """The axis about which most scans turn, by their good pairs; None where too few agree.
 
@@ -78,12 +87,12 @@ def find_turntable(
         pairs: Results of pairs (i, j), i < j.
         frames: Choices of the pose of every scan's sensor frame in the frame that stood still.
         centres: (3,) middle of each scan's samples, sensor frame.
-        near: Angle in degrees and shift of a middle within which a pose is on the axis.
+        same: A pose that is off by less is on the axis.
     """
     good = turning_pairs(pairs)
     best: Turntable | None = None
     for choice in frames:
-        found = _consensus(good, choice, centres, near)
+        found = _consensus(good, choice, centres, same)
         if found is not None and (best is None or _weight(found, good) > _weight(best, good)):
             best = found
     turning = {k for edge in good for k in edge}
@@ -94,10 +103,9 @@ def find_turntable(
 
 def off_axis_doubts(graph: ViewGraph, turntable: Turntable) -> dict[int, str]:
     """Placed scans whose final pose is no turn about the axis from others: thin pairs slide."""
-    residual = turntable.angle_deg, turntable.shift
-    limits = np.maximum(
-        FINAL_SHARE * np.array(turntable.near), FINAL_RESIDUALS * np.array(residual)
-    )
+    same = np.array([turntable.same.angle_deg, turntable.same.shift])
+    residual = np.array([turntable.angle_deg, turntable.shift])
+    limits = np.maximum(FINAL_SHARE * same, FINAL_RESIDUALS * residual)
     doubts = {}
     for component in graph.components:
         poses = component.poses
@@ -139,7 +147,7 @@ def _consensus(
     good: Mapping[Edge, PairResult],
     frames: Sequence[Pose],
     centres: Sequence[FloatArray],
-    near: tuple[float, float],
+    same: PoseTolerance,
 ) -> Turntable | None:
     """The axis that most scans agree with, each good pair's own axis tried first."""
     best: Turntable | None = None
@@ -153,7 +161,7 @@ def _consensus(
             ]
             middle = np.mean([frames[j].apply(centres[j]) for _, j in edges], axis=0)
             axis = fit_axis(motions, middle)
-            found = Turntable(axis=axis, frames=frames, centres=centres, near=near)
+            found = Turntable(axis=axis, frames=frames, centres=centres, same=same)
             edges = tuple(
                 edge for edge in good if found.allows(edge, good[edge].alternatives[0].i_from_j)
             )
@@ -175,7 +183,7 @@ def _with_residual(
         axis=found.axis,
         frames=found.frames,
         centres=found.centres,
-        near=found.near,
+        same=found.same,
         edges=edges,
         num_scans=_num_joined(edges),
         angle_deg=float(angle),

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from scanweld.evidence.evidence import MIN_AGREE, Evidence
-from scanweld.evidence.rivals import MIN_TOLD_SHARE, as_rival, margin_over, refutation
+from scanweld.evidence.rivals import MIN_REFUTED_RIVAL_SHARE, as_rival, margin_over, refutation
 from scanweld.evidence.slippage import Slippage
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
@@ -103,7 +103,7 @@ def margin_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> fl
 
 def refutation_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> float:
     """How clearly the others of a pair's poses are refuted."""
-    least = max(MIN_AGREE, MIN_TOLD_SHARE * chosen.evidence.agree)
+    least = max(MIN_AGREE, MIN_REFUTED_RIVAL_SHARE * chosen.evidence.agree)
     rivals = [other.evidence for other in alternatives if other is not chosen]
     return refutation([told.violation / told.agree for told in rivals if told.agree >= least])
 
@@ -125,10 +125,12 @@ class PairResult:
         rms: Point-to-plane residual of the best pose's matches, in the scans' unit; NaN if none.
         sliding: Which motion is free, where the pair is a sliding one.
         symmetry: What the equally good poses of an ambiguous pair have in common.
-        is_marked: Whether the best pose of an ambiguous pair is the one that explains a small mark,
-            all others that tie being left out: they contradict it or hide it.
-        passed_over: Those others, best first, where a mark decides.
-        tied_too: More poses that explain the scans as well. They are told, and propose nothing.
+        rests_on_feature: Whether the best pose of an ambiguous pair is the one that explains a
+            symmetry-breaking feature, all others that tie being left out: they contradict it or
+            hide it.
+        passed_over: Those others, best first, where a feature decides.
+        further_ties: More poses that explain the scans as well. They are reported, and propose
+            nothing.
     """
 
     i: int
@@ -142,9 +144,9 @@ class PairResult:
     rms: float
     sliding: Slippage | None = None
     symmetry: Symmetry | None = None
-    is_marked: bool = False
+    rests_on_feature: bool = False
     passed_over: tuple[Alternative, ...] = ()
-    tied_too: tuple[Alternative, ...] = ()
+    further_ties: tuple[Alternative, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

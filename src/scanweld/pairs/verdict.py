@@ -1,18 +1,16 @@
 """What two scans alone say about their pose: good, sliding, ambiguous, contradicted, no overlap."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scanweld.config import PairsConfig
 from scanweld.evidence.evidence import MIN_AGREE
-from scanweld.evidence.field import ScanField
-from scanweld.evidence.information import information_from, observability_of, two_way_matches
+from scanweld.evidence.information import information_from, observability_of
 from scanweld.evidence.slippage import Slide, Slippage, slide_words, slippage_of
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.pose import Pose
-from scanweld.pairs.alternatives import refined_at, schedules
-from scanweld.pairs.holding import comes_back
+from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import (
     Alternative,
     PairKind,
@@ -21,6 +19,7 @@ from scanweld.pairs.result import (
     near_best,
     weights_of,
 )
+from scanweld.pairs.stability import is_stable
 from scanweld.pairs.symmetry import Symmetry, symmetry_of
 
 ALIKE_SHARE = 0.5
@@ -29,102 +28,97 @@ clearly are often chance."""
 _NOTHING_MEETS = "no pose makes the scans overlap"
 
 
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Measured:
+    """What was measured at the best pose of a pair.
+
+    Attributes:
+        information: (6, 6) information of the pose, as ``information_of`` gives it.
+        rms: Residual of its matches, in the scans' unit; NaN if there are none.
+        symmetry: What the best pose and its rivals have in common; None without a rival.
+        rests_on_feature: Whether a symmetry-breaking feature alone decides, which some turns hide.
+        is_stable: Whether the pose does not slide, though there is no information.
+    """
+
+    information: FloatArray
+    rms: float
+    symmetry: Symmetry | None = None
+    rests_on_feature: bool = False
+    is_stable: bool = False
+
+
 def result_of(
-    i: int,
-    j: int,
-    field_i: ScanField,
-    field_j: ScanField,
-    alternatives: tuple[Alternative, ...],
-    diameter: float,
-    config: PairsConfig,
-    *,
-    is_marked: bool = False,
+    problem: PairProblem, alternatives: tuple[Alternative, ...], *, rests_on_feature: bool = False
 ) -> PairResult:
     """The result of a pair from its distinct poses, the one to be judged first.
 
-    If only a mark decides for it, turns that hide the mark being left, then the pair stays
+    If only a feature decides for it, turns that hide the feature being left, then the pair stays
     ambiguous, and no turn is free. A sure pose of which noise leaves no information, but which
     comes back from wherever it is pushed, does not slide.
     """
     if not alternatives:
-        return no_pose(i, j, _NOTHING_MEETS)
-    best, tolerance = alternatives[0], config.tolerance_diameters[2] * diameter
-    matches = two_way_matches(field_i, field_j, best.i_from_j, tolerance)
-    information, rms, _ = information_from([matches], diameter)
-    symmetry = _symmetry_among(alternatives, field_j, diameter, config)
-
-    def classified(*, is_held: bool) -> PairResult:
-        found = information, rms, symmetry
-        flags = {"is_marked": is_marked, "is_held": is_held}
-        return classify_pair(i, j, alternatives, *found, config, **flags)
-
-    def refine(poses: Sequence[Pose]) -> list[Alternative]:
-        _, near = schedules(diameter)
-        return refined_at(field_i, field_j, poses, near, tolerance, diameter)
-
-    result = classified(is_held=False)
+        return no_pose(*problem.edge, _NOTHING_MEETS)
+    config, best = problem.config, alternatives[0]
+    matches = problem.matches(best.i_from_j)
+    information, rms, _ = information_from([matches], problem.diameter)
+    measured = Measured(
+        information=information,
+        rms=rms,
+        symmetry=_symmetry_among(problem, alternatives),
+        rests_on_feature=rests_on_feature,
+    )
+    result = classify_pair(problem.edge, alternatives, measured, config)
     if result.kind is not PairKind.SLIDING or result.margin < config.min_margin:
         return result
-    least = config.min_observability, config.min_margin
-    is_held = comes_back(best, information, matches[0], diameter, refine, *least)
-    return classified(is_held=is_held)
+    stable = is_stable(problem, best, information, matches[0])
+    return classify_pair(problem.edge, alternatives, replace(measured, is_stable=stable), config)
 
 
-def _symmetry_among(
-    alternatives: Sequence[Alternative], j: ScanField, diameter: float, config: PairsConfig
-) -> Symmetry | None:
+def _symmetry_among(problem: PairProblem, alternatives: Sequence[Alternative]) -> Symmetry | None:
     """What the best pose has in common with those that fit nearly as well."""
+    config = problem.config
     alike = near_best(alternatives, ALIKE_SHARE * config.min_margin)
     weights = weights_of(alike, config.min_margin, config.min_score)
-    return symmetry_of([option.i_from_j for option in alike], weights, j.centre, diameter)
+    poses = [option.i_from_j for option in alike]
+    return symmetry_of(poses, weights, problem.j.centre, problem.diameter)
 
 
 def classify_pair(
-    i: int,
-    j: int,
+    edge: tuple[int, int],
     alternatives: tuple[Alternative, ...],
-    information: FloatArray,
-    rms: float,
-    symmetry: Symmetry | None,
+    measured: Measured,
     config: PairsConfig,
-    *,
-    is_marked: bool = False,
-    is_held: bool = False,
 ) -> PairResult:
     """Give a pair its kind: what its evidence, margin and observability allow to say.
 
     Args:
-        i: Index of the first scan,
-        j: of the second, i < j.
+        edge: Indices (i, j) of the scans, i < j.
         alternatives: Distinct poses between the sensor frames, best first.
-        information: (6, 6) information of the best pose.
-        rms: Residual of the best pose, in the scans' unit; NaN if there is none.
-        symmetry: What the best pose and its rivals have in common; None without a rival.
+        measured: What was measured at the best of them.
         config: Settings.
-        is_marked: Whether a mark alone decides, which some turns hide.
-        is_held: Whether the best pose does not slide, though there is no information.
     """
     margin = margin_among(alternatives[0], alternatives) if alternatives else 0.0
-    sliding = slippage_of(information, config.min_observability)
-    if is_held or (is_marked and sliding is not None and sliding.slide is Slide.REVOLUTION):
+    sliding = slippage_of(measured.information, config.min_observability)
+    turns_freely = sliding is not None and sliding.slide is Slide.REVOLUTION
+    if measured.is_stable or (measured.rests_on_feature and turns_freely):
         sliding = None
-    kind, reason = _kind(alternatives, sliding, margin, symmetry, config)
-    is_marked = is_marked and kind is PairKind.GOOD
-    if is_marked:
+    kind, reason = _kind(alternatives, sliding, margin, measured.symmetry, config)
+    rests_on_feature = measured.rests_on_feature and kind is PairKind.GOOD
+    if rests_on_feature:
         kind, reason = PairKind.AMBIGUOUS, "only a small mark decides: other poses hide it"
     return PairResult(
-        i=i,
-        j=j,
+        i=edge[0],
+        j=edge[1],
         kind=kind,
         reason=reason,
         alternatives=alternatives,
-        information=information,
-        observability=observability_of(information),
+        information=measured.information,
+        observability=observability_of(measured.information),
         margin=margin,
-        rms=rms,
+        rms=measured.rms,
         sliding=sliding if kind is PairKind.SLIDING else None,
-        symmetry=symmetry if kind is PairKind.AMBIGUOUS else None,
-        is_marked=is_marked,
+        symmetry=measured.symmetry if kind is PairKind.AMBIGUOUS else None,
+        rests_on_feature=rests_on_feature,
     )
 
 

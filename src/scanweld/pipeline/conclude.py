@@ -7,8 +7,8 @@ from typing import TypeVar
 from scanweld.confidence.assess import Assessed, Confidence
 from scanweld.config import Config
 from scanweld.evidence.evidence import Evidence
-from scanweld.evidence.field import ScanField
-from scanweld.evidence.visibility import judge
+from scanweld.evidence.judge import Judge
+from scanweld.evidence.visibility import two_way_evidence
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
@@ -16,9 +16,8 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.graph.reasons import why_open
 from scanweld.graph.view_graph import ViewGraph
-from scanweld.heat.features import Features
 from scanweld.pairs.result import Alternative, PairResult, weights_of
-from scanweld.pipeline.intake import Intake
+from scanweld.pipeline.method import Scene
 from scanweld.reconstruction import (
     AlternativeReport,
     FactReport,
@@ -35,9 +34,7 @@ Report = TypeVar("Report", ScanReport, PairReport)
 
 
 def conclude(
-    intake: Intake,
-    features: Sequence[Features | None],
-    fields: Sequence[ScanField],
+    scene: Scene,
     graph: ViewGraph,
     confidence: Confidence,
     mesh: TriangleMesh | None,
@@ -46,17 +43,14 @@ def conclude(
     stages: Mapping[str, StageReport],
 ) -> Reconstruction:
     """Put together what a run gives back, with poses between the scans' own frames."""
-    prepared = intake.prepared
+    intake, prepared = scene.intake, scene.intake.prepared
     unplaced = dict(intake.refused)
     unplaced.update({prepared[k].name: reason for k, reason in graph.unplaced.items()})
     scans = {
         name: unplaced_report(intake.scans.get(name), reason) for name, reason in unplaced.items()
     }
     for k, scan in enumerate(prepared):
-        found = features[k]
-        report = _scan_report(
-            k, intake, fields, graph, 0 if found is None else len(found.points), config
-        )
+        report = _scan_report(k, scene, graph)
         scans[scan.name] = _with_confidence(report, confidence.scans.get(k))
     verdict, reasons = _verdict(graph, scans, mesh, facts, config)
     return Reconstruction(
@@ -150,20 +144,17 @@ def prepared_report(scan: PreparedScan, verdict: ScanVerdict, reason: str) -> Sc
 
 def _scan_report(
     k: int,
-    intake: Intake,
-    fields: Sequence[ScanField],
+    scene: Scene,
     graph: ViewGraph,
-    num_keypoints: int,
-    config: Config,
 ) -> ScanReport:
-    prepared = intake.prepared
+    prepared, found = scene.intake.prepared, scene.features[k]
     scan = prepared[k]
     neighbours = graph.neighbours(k)
     overlap = None
     if k in graph.unplaced:
         verdict, reason = ScanVerdict.UNPLACED, graph.unplaced[k]
     else:
-        overlap = _overlap(k, intake, fields, graph, config)
+        overlap = _overlap(k, scene.judge, graph)
         told = f"{overlap:.0%} of its surface agrees with another scan"
         if k in graph.doubts:
             verdict, reason = ScanVerdict.DOUBTFUL, graph.doubts[k]
@@ -173,21 +164,20 @@ def _scan_report(
             reason = f"held by {pairs}; {told}"
     return replace(
         prepared_report(scan, verdict, reason),
-        num_keypoints=num_keypoints,
+        num_keypoints=0 if found is None else len(found.points),
         edges=tuple(sorted(prepared[n].name for n in neighbours)),
         overlap=overlap,
         rms=graph.rms.get(k),
     )
 
 
-def _overlap(
-    k: int, intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config
-) -> float:
+def _overlap(k: int, judge: Judge, graph: ViewGraph) -> float:
     """Largest share of a scan's samples that agree with one other scan of its component."""
     poses = next(c.poses for c in graph.components if k in c.poses)
-    tolerance = config.pairs.tolerance_diameters[2] * intake.diameter
     shares = [
-        judge(fields[k], fields[m], poses[k].inverse() @ poses[m], tolerance)[0].agree
+        two_way_evidence(
+            judge.fields[k], judge.fields[m], poses[k].inverse() @ poses[m], judge.tolerance
+        )[0].agree
         for m in _others(poses, k)
     ]
     return max(shares, default=0.0)
@@ -204,7 +194,7 @@ def _pair_report(
 ) -> PairReport:
     result = graph.pairs[edge]
     chosen = graph.accepted.get(edge) or result.best
-    options = (*result.alternatives, *result.tied_too)
+    options = (*result.alternatives, *result.further_ties)
     weights = weights_of(options, config.pairs.min_margin, config.pairs.min_score)
     a, b = (prepared[k] for k in edge)
     is_swapped = b.name < a.name

@@ -9,8 +9,8 @@ from scanweld.config import Config
 from scanweld.errors import InputError
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.knowledge.by_index import IndexedKnowledge
 from scanweld.knowledge.facts import Knowledge
-from scanweld.knowledge.given import Given
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
@@ -42,7 +42,7 @@ class Intake:
         refused: Reason for each of the others, by name.
         scans: All that could be read, by name.
         knowledge: What users know beforehand, by name.
-        given: The same of those that take part, by index.
+        known: The same of those that take part, by index.
     """
 
     prepared: tuple[PreparedScan, ...]
@@ -50,7 +50,7 @@ class Intake:
     refused: Mapping[str, str]
     scans: Mapping[str, RangeScan]
     knowledge: Knowledge
-    given: Given
+    known: IndexedKnowledge
 
 
 def take_in(
@@ -107,7 +107,7 @@ def take_in(
         refused=refused,
         scans={scan.name: scan for scan in scans},
         knowledge=knowledge,
-        given=knowledge.by_index(prepared),
+        known=knowledge.by_index(prepared),
     )
 
 

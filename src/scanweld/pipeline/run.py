@@ -4,14 +4,31 @@ from collections.abc import Mapping, Sequence
 
 from scanweld.config import Config
 from scanweld.geometry.scan import RangeScan
+from scanweld.heat.features import Features
 from scanweld.knowledge.facts import Knowledge
-from scanweld.pipeline.intake import take_in
-from scanweld.pipeline.published import reconstruct_as_published
-from scanweld.pipeline.robust import reconstruct
+from scanweld.pipeline.conclude import conclude
+from scanweld.pipeline.intake import Intake, take_in
+from scanweld.pipeline.method import Scene
+from scanweld.pipeline.published import published_method
+from scanweld.pipeline.robust import robust_method
+from scanweld.pipeline.stages import (
+    assess_placed,
+    check_knowledge,
+    common_axis,
+    describe_scans,
+    fuse_largest,
+    lay_out,
+    place_scans,
+    refine_placed,
+    register_pairs,
+)
 from scanweld.reconstruction import Reconstruction
 from scanweld.work.progress import Cache, NoCache, Progress, silent
 from scanweld.work.stage_log import Stages
 from scanweld.work.threads import num_workers, single_threaded_algebra
+
+METHODS = {"robust": robust_method, "paper": published_method}
+"""By their names in the settings: from the scans of a run to the steps of a method."""
 
 
 def run(
@@ -33,7 +50,7 @@ def run(
         unreadable: Name -> reason of scans that could not even be read, for the report.
         workers: Threads over scans and pairs; as many as there are cores if not given.
         cache: Keeps finished work, so that an interrupted run goes on where it stopped.
-        progress: Told of stages, their finished items, and scans that are refused.
+        progress: PixelConsensus of stages, their finished items, and scans that are refused.
 
     Returns:
         The poses of the scans that could be placed, the mesh, and the report. Scans that could
@@ -47,6 +64,33 @@ def run(
     stages = Stages(workers=num_workers(workers), cache=cache or NoCache(), progress=progress)
     with single_threaded_algebra():
         intake = take_in(scans, unreadable or {}, knowledge or Knowledge(), config, stages)
-        if config.method == "paper":
-            return reconstruct_as_published(intake, config, stages)
         return reconstruct(intake, config, stages)
+
+
+def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstruction:
+    """Register the scans of a run, fuse them and judge what came out, by the method asked for.
+
+    Args:
+        intake: The scans, prepared, and what users know of them.
+        config: Settings of every stage.
+        stages: Bookkeeping of the run.
+    """
+    features = _features(intake, config, stages)
+    judge = lay_out(intake, config, stages)
+    scene = Scene(intake=intake, features=features, judge=judge)
+    method = METHODS[config.method](scene, config)
+    found = register_pairs(scene, method, stages)
+    axis = common_axis(scene, found, config)
+    graph = place_scans(scene, found, axis, method, config, stages)
+    graph = refine_placed(scene, graph, axis, method, config, stages)
+    graph, confidence = assess_placed(scene, graph, config, stages)
+    mesh = fuse_largest(intake, graph, config, stages)
+    facts = check_knowledge(scene, graph, axis)
+    return conclude(scene, graph, confidence, mesh, facts, config, stages.reports)
+
+
+def _features(intake: Intake, config: Config, stages: Stages) -> Sequence[Features | None]:
+    """PA-HKS keypoints of every scan, unless the settings do without."""
+    if config.method == "robust" and config.pairs.keypoints == "even":
+        return [None] * len(intake.prepared)
+    return describe_scans(intake, config, stages)

@@ -1,44 +1,39 @@
-"""Steps that both methods take, each a stage of the run."""
+"""The stages of a run, one after the other."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
+from itertools import combinations
 
 from scanweld.confidence.assess import Confidence, assess
+from scanweld.confidence.diagnostics import diagnostics_of
 from scanweld.confidence.model import stored_calibration
-from scanweld.confidence.witnesses import witnesses_of
 from scanweld.config import Config
 from scanweld.errors import InputError
-from scanweld.evidence.edges import judge_off_edges, with_wide_edges
-from scanweld.evidence.evidence import Evidence
-from scanweld.evidence.field import ScanField, make_field
-from scanweld.evidence.patches import Told, told_of
-from scanweld.evidence.pixels import see
-from scanweld.evidence.visibility import judge, mean_evidence
+from scanweld.evidence.field import make_field
+from scanweld.evidence.judge import Judge
 from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
-from scanweld.graph.assemble import Settle, build_view_graph
-from scanweld.graph.merge import Judge, Poses, Tell
+from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.graph.assemble import build_view_graph
+from scanweld.graph.problem import GraphProblem
 from scanweld.graph.reasons import doubt_alone, find_doubts
-from scanweld.graph.refine_graph import Refine, refine_graph
+from scanweld.graph.refine_graph import refine_graph
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.heat.features import Features, describe
-from scanweld.knowledge.check import Outcome, check_facts
-from scanweld.knowledge.given import easier_verdict, pairs_as_given, with_given
+from scanweld.knowledge.check import Registered, check_facts
 from scanweld.knowledge.turntable import Turntable, find_turntable, off_axis_doubts
-from scanweld.pairs.result import PairResult
+from scanweld.knowledge.usable_pairs import LenientVerdict, usable_pairs, with_found_pairs
+from scanweld.pairs.result import RESULT_FORMAT, PairResult
 from scanweld.pipeline.intake import Intake
+from scanweld.pipeline.method import Method, Scene
 from scanweld.reconstruction import FactReport
 from scanweld.refinement.scale import estimate_scales
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages, work_key
 
 logger = logging.getLogger(__name__)
-
-NUM_JUDGED_SAMPLES = 300
-"""Samples of a scan that judge merges and refinements: thousands of poses are asked about."""
 
 
 def describe_scans(intake: Intake, config: Config, stages: Stages) -> list[Features]:
@@ -54,124 +49,114 @@ def describe_scans(intake: Intake, config: Config, stages: Stages) -> list[Featu
     return found
 
 
-def lay_out(intake: Intake, stages: Stages) -> list[ScanField]:
-    """Every scan as the arrays that the pairs' kernels take."""
+def lay_out(intake: Intake, config: Config, stages: Stages) -> Judge:
+    """Every scan as the arrays that the kernels take, and who judges any two of them."""
     with stages.stage("lay out") as counts:
         counts["scans"] = len(intake.prepared)
-        return stages.each(
+        fields = stages.each(
             "lay out", lambda scan: make_field(scan, intake.diameter), intake.prepared
         )
+    tolerance = config.pairs.fine_tolerance_diameters * intake.diameter
+    return Judge(fields=fields, diameter=intake.diameter, tolerance=tolerance)
 
 
-def pair_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
-    """What gives the evidence on any pair of scans at any pose, by a few hundred samples each."""
-    tolerance = config.pairs.tolerance_diameters[2] * diameter
+def register_pairs(scene: Scene, method: Method, stages: Stages) -> dict[Edge, PairResult]:
+    """Register every pair of scans, and judge what two scans alone say."""
+    intake = scene.intake
+    edges = list(combinations(range(len(intake.prepared)), 2))
 
-    def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
-        both = judge(fields[i], fields[j], i_from_j, tolerance, NUM_JUDGED_SAMPLES)
-        return mean_evidence(*both)
+    def key(edge: Edge) -> str:
+        hashes = [intake.prepared[k].work_hash for k in edge]
+        start = intake.known.start_key(edge)
+        what = f"{method.name} pair"
+        return work_key(what, RESULT_FORMAT, *hashes, intake.diameter, *method.settings, *start)
 
-    return judge_pair
-
-
-def off_edges_judge(fields: Sequence[ScanField], diameter: float, config: Config) -> Judge:
-    """The same with samples before the edges of what the other sensor saw left out."""
-    tolerance = config.pairs.tolerance_diameters[2] * diameter
-
-    @cache
-    def both(k: int) -> tuple[ScanField, ScanField]:
-        return fields[k], with_wide_edges(fields[k], tolerance)
-
-    def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
-        return judge_off_edges(both(i), both(j), i_from_j, tolerance, NUM_JUDGED_SAMPLES)
-
-    return judge_pair
+    with stages.stage("pairs") as counts:
+        results = stages.each("pairs", method.register, edges, key)
+        counts["pairs"] = len(results)
+    return {
+        edge: replace(result, i=edge[0], j=edge[1])
+        for edge, result in zip(edges, results, strict=True)
+    }
 
 
-def pixel_teller(fields: Sequence[ScanField], diameter: float, config: Config) -> Tell:
-    """What gives what all pixels of two components' scans say of each other."""
-    tolerance = config.pairs.tolerance_diameters[2] * diameter
+def common_axis(scene: Scene, found: Mapping[Edge, PairResult], config: Config) -> Turntable | None:
+    """The axis about which most good pairs turn, in frames of the sensors or of the files.
 
-    def tell(a: Poses, b: Poses) -> list[Told]:
-        both = {
-            (i, j): see(fields[i], fields[j], a[i].inverse() @ b[j], diameter) for i in a for j in b
-        }
-        of_a = [told_of([both[i, j][0] for j in b], tolerance) for i in a]
-        return of_a + [told_of([both[i, j][1] for i in a], tolerance) for j in b]
-
-    return tell
+    None if the scans are not said to have one.
+    """
+    if not scene.intake.known.turntable:
+        return None
+    sensors = [Pose.identity() for _ in scene.judge.fields]
+    files = [scan.scan_from_sensor for scan in scene.intake.prepared]
+    return find_turntable(found, [sensors, files], scene.judge.centres, _same(scene, config))
 
 
 def place_scans(
-    intake: Intake,
-    fields: Sequence[ScanField],
-    pairs: Mapping[Edge, PairResult],
-    settle: Settle,
+    scene: Scene,
+    found: Mapping[Edge, PairResult],
+    axis: Turntable | None,
+    method: Method,
     config: Config,
     stages: Stages,
 ) -> ViewGraph:
-    """Place what the pairs can place together without contradiction, as far as is given.
+    """Place what the pairs can place together without contradiction, as far as users' facts allow.
 
     Args:
-        intake: The scans, prepared, and what is given of them.
-        fields: The scans laid out.
-        pairs: Every pair, judged.
-        settle: Refines the poses of a component as it grows.
+        scene: The scans.
+        found: Every pair, judged.
+        axis: The common axis, if there is one.
+        method: Refines the poses of a component as it grows.
         config: Settings.
         stages: Bookkeeping of the run.
     """
-    given = intake.given
+    judge, known = scene.judge, scene.intake.known
     with stages.stage("graph") as counts:
-        easier = easier_verdict(fields, intake.diameter, config.pairs)
-        axis = _common_axis(intake, fields, pairs, config)
-        graph = build_view_graph(
-            len(fields),
-            pairs_as_given(pairs, given, axis, easier),
-            [field.centre for field in fields],
-            intake.diameter,
-            pair_judge(fields, intake.diameter, config),
-            settle,
-            config.graph,
-            given.apart,
-            pixel_teller(fields, intake.diameter, config),
-            off_edges_judge(fields, intake.diameter, config),
+        verdict = LenientVerdict(fields=judge.fields, diameter=judge.diameter, config=config.pairs)
+        problem = GraphProblem(
+            pairs=usable_pairs(found, known, axis, verdict),
+            centres=judge.centres,
+            same=_same(scene, config),
+            judge=judge,
+            settle=method.settle,
+            config=config.graph,
+            apart=known.apart,
         )
-        graph = with_given(graph, pairs, given)
+        graph = with_found_pairs(build_view_graph(problem), found, known)
         counts["accepted"] = len(graph.accepted)
         counts["components"] = len(graph.components)
     return graph
 
 
 def refine_placed(
-    intake: Intake,
-    fields: Sequence[ScanField],
+    scene: Scene,
     graph: ViewGraph,
-    refine: Refine,
+    axis: Turntable | None,
+    method: Method,
     config: Config,
     stages: Stages,
 ) -> ViewGraph:
     """Refine each component's poses together (paper 3.2), and doubt what comes out.
 
     Args:
-        intake: The scans, prepared, and what is given of them.
-        fields: The scans laid out.
+        scene: The scans.
         graph: Components with the poses that the pairs gave them.
-        refine: The joint refinement of a component.
+        axis: The common axis, if there is one.
+        method: Refines the poses of a component together.
         config: Settings.
         stages: Bookkeeping of the run.
     """
-    judge_pair = pair_judge(fields, intake.diameter, config)
+    prepared = scene.intake.prepared
     with stages.stage("refine") as counts:
-        graph = refine_graph(graph, refine, judge_pair)
-        doubts = find_doubts(graph, judge_pair, config.graph)
-        axis = _common_axis(intake, fields, graph.pairs, config)
+        graph = refine_graph(graph, method.refine, scene.judge)
+        doubts = find_doubts(graph, scene.judge, config.graph)
         if axis is not None:
             doubts = {**off_axis_doubts(graph, axis), **doubts}
-        graph = replace(graph, doubts={**_scale_doubts(intake, graph), **doubts})
+        graph = replace(graph, doubts={**_scale_doubts(scene.intake, graph), **doubts})
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     for k, reason in graph.unplaced.items():
-        stages.progress(ScanRefused(scan=intake.prepared[k].name, reason=reason))
+        stages.progress(ScanRefused(scan=prepared[k].name, reason=reason))
     return graph
 
 
@@ -186,55 +171,37 @@ def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:
 
 
 def assess_placed(
-    intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config, stages: Stages
+    scene: Scene, graph: ViewGraph, config: Config, stages: Stages
 ) -> tuple[ViewGraph, Confidence]:
-    """How probable it is that each pose is right; scans of which it is too little are doubtful."""
-    judge_pair = pair_judge(fields, intake.diameter, config)
+    """How probable it is that each pose is right; scans below ``min_good`` are marked doubtful."""
     with stages.stage("confidence") as counts:
-        witnesses = witnesses_of(intake.prepared, fields, intake.diameter, judge_pair, config)
-        confidence = assess(graph, witnesses, stored_calibration(), config)
+        diagnostics = diagnostics_of(scene.intake.prepared, scene.judge, config.contours)
+        confidence = assess(graph, diagnostics, stored_calibration(), config)
         doubts = dict(graph.doubts)
         for k, found in confidence.scans.items():
             if found.confidence < config.confidence.min_good:
-                told = f"its pose is right with a probability of {found.confidence:.0%} only"
-                doubts.setdefault(k, told)
+                reason = f"its pose is right with a probability of {found.confidence:.0%} only"
+                doubts.setdefault(k, reason)
         graph = replace(graph, doubts=doubts)
         graph = replace(graph, doubts={**doubts, **doubt_alone(graph)})
         counts["doubtful"] = len(graph.doubts)
     return graph, confidence
 
 
-def _common_axis(
-    intake: Intake,
-    fields: Sequence[ScanField],
-    pairs: Mapping[Edge, PairResult],
-    config: Config,
-) -> Turntable | None:
-    """The axis about which most good pairs turn, in frames of the sensors or of the files.
-
-    None if the scans are not said to have one.
-    """
-    if not intake.given.turntable:
-        return None
-    sensors = [Pose.identity() for _ in fields]
-    files = [scan.scan_from_sensor for scan in intake.prepared]
-    near = config.graph.max_cycle_deg, config.graph.max_cycle_diameters * intake.diameter
-    return find_turntable(pairs, [sensors, files], [field.centre for field in fields], near)
-
-
 def check_knowledge(
-    intake: Intake, fields: Sequence[ScanField], graph: ViewGraph, config: Config
+    scene: Scene, graph: ViewGraph, axis: Turntable | None
 ) -> tuple[FactReport, ...]:
     """Every fact that users gave against what was found."""
-    outcome = Outcome(
-        prepared=intake.prepared,
-        graph=graph,
-        centres=[field.centre for field in fields],
-        diameter=intake.diameter,
-        judge=pair_judge(fields, intake.diameter, config),
-        turntable=_common_axis(intake, fields, graph.pairs, config),
+    registered = Registered(
+        prepared=scene.intake.prepared, graph=graph, judge=scene.judge, turntable=axis
     )
-    return check_facts(intake.knowledge, outcome)
+    return check_facts(scene.intake.knowledge, registered)
+
+
+def _same(scene: Scene, config: Config) -> PoseTolerance:
+    """Poses of a scan that differ by less close a cycle."""
+    shift = config.graph.max_cycle_diameters * scene.judge.diameter
+    return PoseTolerance(angle_deg=config.graph.max_cycle_deg, shift=shift)
 
 
 def fuse_largest(

@@ -12,10 +12,10 @@ from scanweld.geometry.point_fit import rigid_fit
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features
-from scanweld.pairs.alternatives import to_pose
 from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
-from scanweld.pairs.register import SAME_ANGLE_DEG, SAME_SHIFT_DIAMETERS, score_poses
+from scanweld.pairs.problem import to_pose
+from scanweld.pairs.search import same_hypothesis, score_poses
 from scanweld.published.consensus import agreed_pose
 from scanweld.published.point_icp import PointAlignment, point_icp
 from scanweld.published.signature_matching import match_signatures
@@ -130,8 +130,8 @@ def _register_by_evidence(
     anchors_j = Anchors(points=features_j.points, normals=features_j.normals)
     coarse, middle = (share * i.diameter for share in EVIDENCE_DIAMETERS)
     rows, _ = sweep(field_i, field_j, anchors_i, anchors_j, NUM_TURNS, coarse, MAX_STARTS)
-    near = np.radians(SAME_ANGLE_DEG), SAME_SHIFT_DIAMETERS * i.diameter
-    chosen = distinct_poses(rows, field_j.centre, *near, NUM_STARTS)
+    same = same_hypothesis(i.diameter)
+    chosen = distinct_poses(rows, field_j.centre, same.angle, same.shift, NUM_STARTS)
     if len(chosen) == 0:
         return _no_pose(0, "no pair of keypoints gives a pose that the sensors allow")
     source, target = j.samples.points[:NUM_SHORT_SAMPLES], field_i.surface[:, :3]

@@ -10,7 +10,7 @@ import numpy as np
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features
-from scanweld.pairs.alternatives import to_pose
+from scanweld.pairs.problem import to_pose
 from scanweld.published.signature_matching import signature_distances
 
 LENGTH_TOLERANCE_DIAMETERS = 0.03

@@ -6,31 +6,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanweld.config import GraphConfig, PairsConfig
+from scanweld.config import GraphConfig
 from scanweld.evaluation.primitives import lathe
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
-from scanweld.evidence.patches import Told, is_refuted_jointly, told_of
+from scanweld.evidence.judge import Poses
+from scanweld.evidence.patches import PixelConsensus, is_refuted_jointly, pixel_consensus
 from scanweld.evidence.pixels import see
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.graph.merge import Merge, Poses, propose_merges
+from scanweld.graph.merge import Merge, propose_merges, unrefuted
 from scanweld.graph.reasons import doubt_alone, find_doubts
 from scanweld.graph.view_graph import Component, ViewGraph
-from scanweld.pairs.alternatives import alternative_at
 from scanweld.pairs.anchors import even_anchors
-from scanweld.pairs.marks import Decided, decide
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import Alternative, PairKind, PairResult
-from scanweld.pairs.turning import STEP_DEG, turn_to_mark
+from scanweld.pairs.revolution import STEP_DEG, turn_to_feature
+from scanweld.pairs.symmetry_breaking import Decision, decide
 from tests.prepared import PreparedPair, prepared_pair
 from tests.scenes import scene_of
-from tests.view_graphs import exact_pair, pair_of, seen, world_of
+from tests.view_graphs import SAME, DrawnJudge, exact_pair, pair_of, seen, world_of
 
 Radius = Callable[[FloatArray, FloatArray], FloatArray]
 TOLERANCE = 0.012
-NEAR_DEG, NEAR_SHIFT = 12.0, 0.06
-NOWHERE = np.zeros((4, 4), dtype=bool)
+NEAR_DEG = 12.0
 
 
 def gear(turn: FloatArray, level: FloatArray) -> FloatArray:
@@ -71,7 +70,7 @@ def turned(pair: PreparedPair, degrees: Sequence[float]) -> list[Alternative]:
     for angle in degrees:
         turn = rotation_exp(np.radians(angle) * axis)
         pose = pair.i_from_j @ Pose(rotation=turn, translation=point - turn @ point)
-        options.append(alternative_at(*pair.fields, pose, TOLERANCE * pair.diameter))
+        options.append(pair.problem().evaluate(pose))
     return sorted(options, key=lambda option: -option.score)
 
 
@@ -89,13 +88,8 @@ def axis_of(pair: PreparedPair) -> tuple[FloatArray, FloatArray]:
     return axis.astype(np.float64), point.astype(np.float64)
 
 
-def decided(pair: PreparedPair, options: Sequence[Alternative]) -> Decided | None:
-    def refine(poses: Sequence[Pose]) -> list[Alternative]:
-        return [alternative_at(*pair.fields, pose, TOLERANCE * pair.diameter) for pose in poses]
-
-    near = np.radians(NEAR_DEG), NEAR_SHIFT * pair.diameter
-    size = TOLERANCE * pair.diameter, pair.diameter
-    return decide(*pair.fields, options, refine, near, *size, 0.4)
+def decided(pair: PreparedPair, options: Sequence[Alternative]) -> Decision | None:
+    return decide(pair.problem(), options)
 
 
 EIGHT = [45.0 * k for k in range(8)]
@@ -112,9 +106,9 @@ def test_a_worn_tooth_decides_between_the_turns_of_a_gear(noise: float):
 
 
 def registered(pair: PreparedPair) -> PairResult:
-    config = PairsConfig()
-    a, b = (even_anchors(field, config.num_anchors) for field in pair.fields)
-    return register_pair(0, 1, *pair.fields, [(a, b)], pair.diameter, config)
+    problem = pair.problem()
+    a, b = (even_anchors(field, problem.config.num_anchors) for field in pair.fields)
+    return register_pair(problem, [(a, b)])
 
 
 def test_what_a_mark_decides_against_is_told():
@@ -158,9 +152,8 @@ def test_a_knob_decides_and_says_that_some_turns_hide_it():
 @pytest.mark.parametrize("start_deg", [-40.0, -25.0, 50.0, 100.0])
 def test_a_vase_is_turned_until_its_knobs_meet(start_deg: float):
     pair = scanned(knobbed, 100.0, 15.0, 0.001)
-    tolerance = TOLERANCE * pair.diameter
     start = turned(pair, [start_deg])[0].i_from_j
-    found = turn_to_mark(*pair.fields, start, tolerance, pair.diameter, 2.5e-4)
+    found = turn_to_feature(pair.problem(), start)
     assert found is not None
     angle, shift = pair.off_by(found)
     assert angle < STEP_DEG and shift < 0.01
@@ -170,8 +163,7 @@ def test_a_vase_is_turned_until_its_knobs_meet(start_deg: float):
 def test_without_a_mark_or_a_free_turn_nothing_is_turned(body: Radius, height: float):
     pair = scanned(body, height, 20.0, 0.001)
     start = turned(pair, [45.0])[0].i_from_j
-    tolerance = TOLERANCE * pair.diameter
-    assert turn_to_mark(*pair.fields, start, tolerance, pair.diameter, 2.5e-4) is None
+    assert turn_to_feature(pair.problem(), start) is None
 
 
 def test_one_rival_shows_no_symmetry():
@@ -186,7 +178,7 @@ def test_a_pose_refutes_another_and_not_itself():
     right, wrong = (turned(pair, [angle])[0].i_from_j for angle in (0.0, 45.0))
     tolerance = TOLERANCE * pair.diameter
     here, there = (
-        [told_of([one], tolerance) for one in see(*pair.fields, pose, pair.diameter)]
+        [pixel_consensus([one], tolerance) for one in see(*pair.fields, pose, pair.diameter)]
         for pose in (right, wrong)
     )
     assert is_refuted_jointly(there, here)
@@ -201,8 +193,9 @@ def test_merges_that_another_one_refutes_are_no_rivals():
     both = [Alternative(i_from_j=pose, evidence=seen(0.5)) for pose in (right, right @ spin)]
     pairs = {(0, 1): pair_of(0, 1, PairKind.AMBIGUOUS, *both)}
     a, b = {0: Pose.identity()}, {1: Pose.identity()}
-    fixed = a, b, pairs, [np.zeros(3)] * 2, (5.0, 0.03), lambda i, j, pose: seen(0.5)
-    tied = propose_merges(*fixed)
+    fixed = a, b, pairs, [np.zeros(3)] * 2, SAME
+    judge = DrawnJudge(says=lambda i, j, pose: seen(0.5))
+    tied = propose_merges(*fixed, judge)
     assert [merge.margin for merge in tied] == pytest.approx([0.0, 0.0])
 
     pair = scanned(worn, 30.0, 35.0, 0.0005)
@@ -211,12 +204,12 @@ def test_merges_that_another_one_refutes_are_no_rivals():
         for is_right in (True, False)
     }
 
-    def tell(_: Poses, moved: Poses) -> list[Told]:
+    def tell(_: Poses, moved: Poses) -> list[PixelConsensus]:
         is_right = (right.inverse() @ moved[1]).angle_deg() < 1.0
         both = see(*pair.fields, poses[is_right], pair.diameter)
-        return [told_of([seen_], TOLERANCE * pair.diameter) for seen_ in both]
+        return [pixel_consensus([seen_], TOLERANCE * pair.diameter) for seen_ in both]
 
-    (kept,) = propose_merges(*fixed, tell)
+    (kept,) = unrefuted(a, b, tied, replace(judge, sees=tell))
     assert (kept.a_from_b.inverse() @ right).angle_deg() < 1e-6 and kept.margin == 1.0
 
 
@@ -230,20 +223,14 @@ def test_what_slides_is_no_rival_of_what_a_mark_decides(kind: PairKind, num_left
     slides = pair_of(1, 2, kind, replace(turn, i_from_j=turn.i_from_j.inverse()))
     a, b = {0: Pose.identity(), 2: other}, {1: Pose.identity()}
 
-    def merges(is_marked: bool) -> list[Merge]:
-        pairs = {(0, 1): replace(marked, is_marked=is_marked), (1, 2): slides}
-        return propose_merges(
-            a,
-            b,
-            pairs,
-            [np.zeros(3)] * 3,
-            (5.0, 0.03),
-            lambda i, j, pose: seen(0.3),
-            lambda *_: [Told(agrees=NOWHERE, violates=NOWHERE, past=NOWHERE, max_pixels=1.0)],
-        )
+    def merges(rests_on_feature: bool) -> list[Merge]:
+        pairs = {(0, 1): replace(marked, rests_on_feature=rests_on_feature), (1, 2): slides}
+        judge = DrawnJudge(says=lambda i, j, pose: seen(0.3))
+        proposed = propose_merges(a, b, pairs, [np.zeros(3)] * 3, SAME, judge)
+        return unrefuted(a, b, proposed, judge)
 
-    assert len(merges(is_marked=False)) == 2
-    left = merges(is_marked=True)
+    assert len(merges(rests_on_feature=False)) == 2
+    left = merges(rests_on_feature=True)
     assert len(left) == num_left
     assert any((merge.a_from_b.inverse() @ right).angle_deg() < 1e-6 for merge in left)
 
@@ -251,16 +238,21 @@ def test_what_slides_is_no_rival_of_what_a_mark_decides(kind: PairKind, num_left
 def test_what_only_a_mark_holds_is_doubtful():
     world = world_of(4)
     pairs = {e: exact_pair(*e, world) for e in ((0, 1), (1, 2), (2, 3))}
-    marked = replace(pairs[2, 3], kind=PairKind.AMBIGUOUS, is_marked=True)
+    marked = replace(pairs[2, 3], kind=PairKind.AMBIGUOUS, rests_on_feature=True)
     component = Component(poses=dict(enumerate(world)), reference=0)
 
     def doubts(last: PairResult) -> dict[int, str]:
         both = {**pairs, (2, 3): last}
         accepted = {edge: result.alternatives[0] for edge, result in both.items()}
         graph = ViewGraph(
-            pairs=both, accepted=accepted, rejected={}, components=(component,), unplaced={}
+            pairs=both,
+            usable=both,
+            accepted=accepted,
+            rejected={},
+            components=(component,),
+            unplaced={},
         )
-        return find_doubts(graph, lambda i, j, pose: seen(0.5), GraphConfig())
+        return find_doubts(graph, DrawnJudge(says=lambda i, j, pose: seen(0.5)), GraphConfig())
 
     assert doubts(pairs[2, 3]) == {}
     assert list(doubts(marked)) == [3]
@@ -274,7 +266,13 @@ def test_no_scan_is_good_alone():
         for scans in ((0, 1, 2), (3, 4))
     )
     graph = ViewGraph(
-        pairs={}, accepted={}, rejected={}, components=(three, two), unplaced={}, doubts={0: "far"}
+        pairs={},
+        usable={},
+        accepted={},
+        rejected={},
+        components=(three, two),
+        unplaced={},
+        doubts={0: "far"},
     )
     assert doubt_alone(graph) == {}
     assert list(doubt_alone(replace(graph, doubts={0: "far", 2: "far", 4: "far"}))) == [1, 3]

@@ -12,7 +12,7 @@ STEPS = 1000
 """Flows are counted in this part of a unit: whole numbers give the same answer anywhere."""
 
 
-def links(component: Component, confidence: Mapping[Edge, float]) -> dict[int, float]:
+def ties_of(component: Component, confidence: Mapping[Edge, float]) -> dict[int, float]:
     """How surely each scan is tied to the reference scan, and that one to the surest other.
 
     A pair of confidence p carries -log(1 - p). The least that must be cut to part two scans is

@@ -9,15 +9,20 @@ from scanweld.evaluation.primitives import lathe
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
 from scanweld.evidence.field import ScanField
-from scanweld.evidence.patches import MIN_PAST_PIXELS, Told, is_looked_past, told_of
-from scanweld.evidence.pixels import PAST_PIXELS, see
+from scanweld.evidence.patches import (
+    MIN_FREE_SPACE_PIXELS,
+    PixelConsensus,
+    pixel_consensus,
+    violates_free_space,
+)
+from scanweld.evidence.pixels import FREE_MARGIN_PIXELS, see
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.graph.merge import propose_merges
+from scanweld.graph.merge import propose_merges, unrefuted
 from scanweld.pairs.result import Alternative, PairKind
 from tests.prepared import PreparedPair, creature_pair, prepared_pair
 from tests.scenes import scene_of
-from tests.view_graphs import pair_of, seen
+from tests.view_graphs import SAME, DrawnJudge, pair_of, seen
 
 TOLERANCE = 0.012
 TURNS = (45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0)
@@ -51,9 +56,9 @@ def turned(pair: PreparedPair, degrees: float) -> Pose:
     return motion @ Pose(rotation=turn, translation=point - turn @ point)
 
 
-def told(pair: PreparedPair, i_from_j: Pose) -> list[Told]:
+def told(pair: PreparedPair, i_from_j: Pose) -> list[PixelConsensus]:
     both = see(*pair.fields, i_from_j, pair.diameter)
-    return [told_of([one], TOLERANCE * pair.diameter) for one in both]
+    return [pixel_consensus([one], TOLERANCE * pair.diameter) for one in both]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.001])
@@ -62,21 +67,21 @@ def test_turns_that_fill_a_notch_in_the_outline_are_refuted(noise: float):
     right = told(pair, pair.i_from_j)
     for degrees in TURNS:
         wrong = told(pair, turned(pair, degrees))
-        assert is_looked_past(wrong, right)
-        assert not is_looked_past(right, wrong)
+        assert violates_free_space(wrong, right)
+        assert not violates_free_space(right, wrong)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.001])
 def test_no_turn_of_a_whole_gear_is_refuted(noise: float):
     pair = from_both_sides(of_toothless=False, noise=noise)
     every = [told(pair, turned(pair, degrees)) for degrees in (0.0, *TURNS)]
-    assert not any(is_looked_past(a, b) for a in every for b in every)
+    assert not any(violates_free_space(a, b) for a in every for b in every)
 
 
 def past(scan: ScanField, moved: Pose) -> int:
     """Pixels of a scan that is moved in its own sensor's frame where that sensor looked past."""
     back, _ = see(scan, scan, moved.inverse(), 1.0)
-    return int(back.past.sum())
+    return int(back.in_free_space.sum())
 
 
 def sideways(scan: ScanField, pixels: float) -> Pose:
@@ -89,7 +94,7 @@ def test_an_outline_a_pixel_off_is_not_looked_past():
     assert past(scan, Pose.identity()) == 0
     far = past(scan, sideways(scan, 12.0))
     assert far > 300
-    assert past(scan, sideways(scan, PAST_PIXELS)) < 0.02 * far
+    assert past(scan, sideways(scan, FREE_MARGIN_PIXELS)) < 0.02 * far
 
 
 def test_what_a_sensor_sees_the_back_of_is_not_looked_past():
@@ -101,7 +106,7 @@ def test_what_a_sensor_sees_the_back_of_is_not_looked_past():
     assert past(scan, shift @ turn) < 0.1 * past(scan, shift)
 
 
-def merges_of(told_by_turn: Sequence[list[Told]]) -> list[int]:
+def merges_of(told_by_turn: Sequence[list[PixelConsensus]]) -> list[int]:
     """Which of equally scored turns of one scan about another are left, given what pixels say."""
     poses = [
         Pose(rotation=rotation_exp(np.array([0.0, 0.0, 0.5 * n])), translation=np.zeros(3))
@@ -112,16 +117,19 @@ def merges_of(told_by_turn: Sequence[list[Told]]) -> list[int]:
     def turn_of(pose: Pose) -> int:
         return int(np.argmin([(pose.inverse() @ one).angle_deg() for one in poses]))
 
+    judge = DrawnJudge(
+        says=lambda i, j, pose: seen(0.5), sees=lambda a, b: told_by_turn[turn_of(b[1])]
+    )
+    a, b = {0: Pose.identity()}, {1: Pose.identity()}
     merges = propose_merges(
-        {0: Pose.identity()},
-        {1: Pose.identity()},
+        a,
+        b,
         {(0, 1): pair_of(0, 1, PairKind.AMBIGUOUS, *options)},
         [np.zeros(3)] * 2,
-        (5.0, 0.03),
-        lambda i, j, pose: seen(0.5),
-        lambda a, b: told_by_turn[turn_of(b[1])],
+        SAME,
+        judge,
     )
-    return sorted(turn_of(merge.a_from_b) for merge in merges)
+    return sorted(turn_of(merge.a_from_b) for merge in unrefuted(a, b, merges, judge))
 
 
 def test_merges_that_sensors_look_past_are_no_rivals():
@@ -130,12 +138,15 @@ def test_merges_that_sensors_look_past_are_no_rivals():
     assert merges_of(every) == [0]
 
 
-def says(*, violates: int = 0, past: range = range(0)) -> list[Told]:
+def says(*, violates: int = 0, past: range = range(0)) -> list[PixelConsensus]:
     """A scan of 400 pixels, of which the first are contradicted, and some looked past."""
     at = np.arange(400).reshape(20, 20)
     return [
-        Told(
-            agrees=at >= violates, violates=at < violates, past=np.isin(at, past), max_pixels=200.0
+        PixelConsensus(
+            agrees=at >= violates,
+            violates=at < violates,
+            in_free_space=np.isin(at, past),
+            max_pixels=200.0,
         )
     ]
 
@@ -150,7 +161,7 @@ def test_outlines_speak_only_where_surfaces_have_shown_a_mark():
 
 def test_an_outline_decides_only_by_far():
     marked = [says(violates=40)] * 3
-    least = MIN_PAST_PIXELS
+    least = MIN_FREE_SPACE_PIXELS
     assert merges_of([says(past=range(least - 1)), says(), *marked]) == [0, 1]
     assert merges_of([says(past=range(least)), says(), *marked]) == [1]
     much = says(past=range(100))

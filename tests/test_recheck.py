@@ -6,21 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanweld.config import GraphConfig
-from scanweld.evidence.edges import judge_off_edges, with_wide_edges
+from scanweld.evidence.edges import evidence_off_edges, with_wide_edges
 from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
-from scanweld.evidence.visibility import judge, mean_evidence
+from scanweld.evidence.visibility import mean_evidence, two_way_evidence
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind
 from scanweld.graph.assemble import build_view_graph
-from scanweld.graph.merge import Judge, Merge, Support, not_only_by
+from scanweld.graph.merge import Merge, without_excluded
+from scanweld.graph.proposals import Proposal
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.pairs.result import PairKind
 from tests.prepared import creature_pair
 from tests.view_graphs import (
-    CENTRE,
+    DrawnJudge,
+    Say,
     exact_pairs,
     graph_of,
     is_same,
@@ -28,6 +29,7 @@ from tests.view_graphs import (
     only_component,
     option,
     pair_of,
+    problem_of,
     scans_of,
     seen,
     stay,
@@ -67,8 +69,8 @@ def evidence_aside(scan: ScanField, pixels: float) -> tuple[Evidence, Evidence]:
     width = (BAR if scan.camera[0] == CameraModel.PINHOLE else WALL) / FOCAL
     aside = Pose(rotation=np.eye(3), translation=np.array([pixels * width, 0.0, 0.0]))
     both = scan, with_wide_edges(scan, 3.0 * PIXEL)
-    strict = mean_evidence(*judge(scan, scan, aside, 0.1))
-    return strict, judge_off_edges(both, both, aside, 0.1)
+    strict = mean_evidence(*two_way_evidence(scan, scan, aside, 0.1))
+    return strict, evidence_off_edges(both, both, aside, 0.1)
 
 
 @pytest.mark.parametrize("model", [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC])
@@ -100,7 +102,7 @@ def test_what_lies_before_a_surface_all_around_is_not_forgiven():
     nearer = Pose(rotation=np.eye(3), translation=np.array([0.0, 0.0, -0.3]))
     both = scan, with_wide_edges(scan, 3.0 * PIXEL)
     # One direction lies before what the other saw, the other one behind it.
-    assert judge_off_edges(both, both, nearer, 0.1).front == pytest.approx(0.5)
+    assert evidence_off_edges(both, both, nearer, 0.1).front == pytest.approx(0.5)
 
 
 def test_only_surfaces_are_looked_for_around_a_pixel():
@@ -110,7 +112,7 @@ def test_only_surfaces_are_looked_for_around_a_pixel():
     assert np.array_equal(around.raster, scan.raster)
 
 
-def drifting(at_truth: Evidence) -> Judge:
+def drifting(at_truth: Evidence) -> Say:
     """Three scans in a row; what 0 and 2 say of each other where 1-2 is 4 deg off, and at truth."""
     world = world_of(3)
     denied = Evidence(agree=0.3, front=0.14, contradict=0, free=0, occluded=0.5, unknown=0.06)
@@ -126,10 +128,10 @@ def drifting(at_truth: Evidence) -> Judge:
 
 
 def chain(
-    judge_pair: Judge,
+    judge_pair: Say,
     *,
     settles: bool,
-    off_edges: Judge | None = None,
+    off_edges: Say | None = None,
     off_deg: float = 4.0,
     rival: Pose | None = None,
 ) -> ViewGraph:
@@ -145,16 +147,8 @@ def chain(
         first = min(poses)
         return {k: poses[first] @ true_pose(world, first, k) for k in poses}
 
-    return build_view_graph(
-        3,
-        pairs,
-        [CENTRE] * 3,
-        1.0,
-        judge_pair,
-        settle if settles else stay,
-        GraphConfig(),
-        judge_off_edges=off_edges,
-    )
+    judge = DrawnJudge(says=judge_pair, says_off_edges=off_edges)
+    return build_view_graph(problem_of(3, pairs, judge, settle if settles else stay))
 
 
 def test_a_merge_is_judged_again_once_its_scans_have_settled():
@@ -208,21 +202,21 @@ def test_without_edges_less_may_be_violated(front: float, is_placed: bool):
     assert 2 in chain(judge_pair, settles=True).unplaced
 
 
-def supported_by(*edges: tuple[int, int]) -> Merge:
-    supports = tuple(
-        Support(i=i, j=j, rank=0, score=0.4, agree=0.4, is_good=True) for i, j in edges
+def proposed_by(*edges: tuple[int, int]) -> Merge:
+    proposals = tuple(
+        Proposal(i=i, j=j, rank=0, score=0.4, agree=0.4, is_good=True) for i, j in edges
     )
     return Merge(
-        a_from_b=Pose.identity(), supports=supports, agree=0.4, violated=0.0, free=0.0, worst=0.0
+        a_from_b=Pose.identity(), proposals=proposals, agree=0.4, violated=0.0, free=0.0, worst=0.0
     )
 
 
 def test_a_pair_taken_back_counts_only_beside_others():
-    alone, beside, other = supported_by((1, 2)), supported_by((1, 2), (0, 3)), supported_by((3, 0))
+    alone, beside, other = proposed_by((1, 2)), proposed_by((1, 2), (0, 3)), proposed_by((3, 0))
     merges = [alone, beside, other]
 
-    def left(*dependent: tuple[int, int, int]) -> list[list[bool]]:
-        return [[s.is_good for s in m.supports] for m in not_only_by(dependent, merges)]
+    def left(*excluded: tuple[int, int, int]) -> list[list[bool]]:
+        return [[s.is_good for s in m.proposals] for m in without_excluded(excluded, merges)]
 
     assert left((1, 2, 0)) == [[False, True], [True]]
     assert left((1, 2, 0), (0, 3, 0)) == []

@@ -1,16 +1,15 @@
-"""What can be asked about a pose of two scans, besides their evidence."""
+"""What is measured of a pose of two scans besides the evidence: how well and firmly they fit."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from scanweld.confidence.misfit import pair_misfit
-from scanweld.config import Config
+from scanweld.config import ContoursConfig
 from scanweld.contours.coherence import contour_coherence
-from scanweld.evidence.field import ScanField
 from scanweld.evidence.information import information_of, observability_of
+from scanweld.evidence.judge import Judge
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.graph.merge import Judge
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
 
 NUM_POINTS = 2000
@@ -18,7 +17,7 @@ NUM_POINTS = 2000
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Looks:
+class Fit:
     """How two scans, or a scan and all others, lie on each other.
 
     Attributes:
@@ -35,52 +34,39 @@ class Looks:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Witnesses:
-    """All scans of a run, and how they are asked.
+class PairDiagnostics:
+    """All scans of a run, and what is measured of a pose of two of them besides the evidence.
 
     Attributes:
-        fields: The scans laid out.
-        sources: Their surface points.
         judge: Gives the evidence on any pair at any pose.
+        sources: Surface points of the scans.
         cohere: Gives the contour coherence of scans i and j at i_from_j.
-        tolerance: Depth tolerance of the evidence, in the scans' unit.
-        diameter: Diameter of the run.
     """
 
-    fields: Sequence[ScanField]
-    sources: Sequence[SurfaceSource]
     judge: Judge
+    sources: Sequence[SurfaceSource]
     cohere: Callable[[int, int, Pose], float]
-    tolerance: float
-    diameter: float
 
-    def look(self, i: int, j: int, i_from_j: Pose, *, at_contours: bool) -> Looks:
-        """How two scans lie on each other at a pose; without its contours, none cohere."""
-        size = self.tolerance, self.diameter
-        information, rms, _ = information_of(self.fields[i], self.fields[j], i_from_j, *size)
-        return Looks(
+    def fit(self, i: int, j: int, i_from_j: Pose, *, at_contours: bool) -> Fit:
+        """How two scans fit at a pose; where contours are not asked about, none cohere."""
+        fields, size = self.judge.fields, (self.judge.tolerance, self.judge.diameter)
+        information, rms, _ = information_of(fields[i], fields[j], i_from_j, *size)
+        return Fit(
             observability=observability_of(information),
-            residual=over(rms, self.tolerance),
+            residual=over(rms, self.judge.tolerance),
             misfit=pair_misfit(self.sources[i], self.sources[j], i_from_j, *size),
             coherence=self.cohere(i, j, i_from_j) if at_contours else 0.0,
         )
 
 
-def witnesses_of(
-    prepared: Sequence[PreparedScan],
-    fields: Sequence[ScanField],
-    diameter: float,
-    judge: Judge,
-    config: Config,
-) -> Witnesses:
-    """Make the scans of a run ready to be asked."""
-    return Witnesses(
-        fields=fields,
-        sources=[surface_source(scan, NUM_POINTS) for scan in prepared],
+def diagnostics_of(
+    prepared: Sequence[PreparedScan], judge: Judge, config: ContoursConfig
+) -> PairDiagnostics:
+    """Make the scans of a run ready to be measured."""
+    return PairDiagnostics(
         judge=judge,
-        cohere=contour_coherence(prepared, config.contours),
-        tolerance=config.pairs.tolerance_diameters[2] * diameter,
-        diameter=diameter,
+        sources=[surface_source(scan, NUM_POINTS) for scan in prepared],
+        cohere=contour_coherence(prepared, config),
     )
 
 

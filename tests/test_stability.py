@@ -1,7 +1,7 @@
 """Poses that noise makes look free: pushed, they come back or they slide."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,26 +12,40 @@ from scanweld.evaluation.primitives import cylinder, lathe, sphere
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import view_of
 from scanweld.evidence.icp import MIN_MATCHES
-from scanweld.evidence.information import information_from, observability_of, two_way_matches
+from scanweld.evidence.information import information_from, observability_of
 from scanweld.evidence.slippage import free_motions
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
-from scanweld.pairs.alternatives import alternative_at, refined_at, schedules
-from scanweld.pairs.holding import PUSH_DIAMETERS, comes_back
+from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import Alternative, PairKind
+from scanweld.pairs.stability import PERTURBATION_DIAMETERS, is_stable
 from scanweld.pairs.verdict import result_of
-from tests.prepared import PreparedPair, pair_of_scene
+from tests.prepared import PreparedPair, creature_pair, pair_of_scene
 from tests.scenes import scene_of, small_creature
 from tests.view_graphs import seen
 
 CONFIG = PairsConfig()
-LEAST = CONFIG.min_observability, CONFIG.min_margin
 DIAMETER = 2.0
 POINTS = np.random.default_rng(0).uniform(-1, 1, size=(200, 3)) + np.array([0.0, 0.0, 5.0])
 ONE_FREE = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 TWO_FREE = np.diag([1.0, 0.0, 1.0, 1.0, 1.0, 0.0])
 BEST = Alternative(i_from_j=Pose.exp([0.3, -0.1, 0.2, 1.0, 2.0, 3.0]), evidence=seen(0.5))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class DrawnProblem(PairProblem):
+    """Two scans that an ICP refines as it is drawn."""
+
+    drawn: Callable[[Sequence[Pose]], list[Alternative]]
+
+    def refine(self, poses: Sequence[Pose]) -> list[Alternative]:
+        return self.drawn(poses)
+
+
+def drawn_problem(refine: Callable[[Sequence[Pose]], list[Alternative]]) -> DrawnProblem:
+    i, j = creature_pair(40.0).fields
+    return DrawnProblem(edge=(0, 1), i=i, j=j, diameter=DIAMETER, config=CONFIG, drawn=refine)
 
 
 def held(information: FloatArray, ends: Sequence[tuple[float, float]]) -> bool:
@@ -47,10 +61,10 @@ def held(information: FloatArray, ends: Sequence[tuple[float, float]]) -> bool:
             for motion, (left, agree) in zip(motions, here, strict=True)
         ]
 
-    found = comes_back(BEST, information, POINTS, DIAMETER, refine, *LEAST)
+    found = is_stable(drawn_problem(refine), BEST, information, POINTS)
     for pose in pushed:
         moved = (pose @ BEST.i_from_j.inverse()).apply(POINTS) - POINTS
-        assert 0.02 < np.sqrt((moved**2).sum(axis=1).mean()) / DIAMETER < 3 * PUSH_DIAMETERS
+        assert 0.02 < np.sqrt((moved**2).sum(axis=1).mean()) / DIAMETER < 3 * PERTURBATION_DIAMETERS
     return found
 
 
@@ -82,9 +96,10 @@ def test_a_pose_is_held_if_it_comes_back_and_fits_nowhere_else(
 
 def test_few_matches_hold_nothing():
     few = POINTS[: MIN_MATCHES - 1]
-    assert not comes_back(BEST, ONE_FREE, few, DIAMETER, lambda poses: [BEST] * len(poses), *LEAST)
+    problem = drawn_problem(lambda poses: [BEST] * len(poses))
+    assert not is_stable(problem, BEST, ONE_FREE, few)
     none = np.zeros((0, 3))
-    assert not comes_back(BEST, np.zeros((6, 6)), none, DIAMETER, lambda _: [], *LEAST)
+    assert not is_stable(problem, BEST, np.zeros((6, 6)), none)
 
 
 NOISE = NoiseModel(depth_diameters=0.005)
@@ -112,21 +127,13 @@ BODIES: dict[str, TriangleMesh] = {
 
 
 def pushed_back(pair: PreparedPair, information: FloatArray) -> bool:
-    tolerance = CONFIG.tolerance_diameters[2] * pair.diameter
-    best = alternative_at(*pair.fields, pair.i_from_j, tolerance)
-    matches = two_way_matches(*pair.fields, pair.i_from_j, tolerance)
-
-    def refine(poses: Sequence[Pose]) -> list[Alternative]:
-        _, near = schedules(pair.diameter)
-        return refined_at(*pair.fields, poses, near, tolerance, pair.diameter)
-
-    return comes_back(best, information, matches[0], pair.diameter, refine, *LEAST)
+    problem = pair.problem()
+    best = problem.evaluate(pair.i_from_j)
+    return is_stable(problem, best, information, problem.matches(pair.i_from_j)[0])
 
 
 def information_at_truth(pair: PreparedPair) -> FloatArray:
-    tolerance = CONFIG.tolerance_diameters[2] * pair.diameter
-    matches = two_way_matches(*pair.fields, pair.i_from_j, tolerance)
-    return information_from([matches], pair.diameter)[0]
+    return information_from([pair.problem().matches(pair.i_from_j)], pair.diameter)[0]
 
 
 @pytest.mark.parametrize("body", ["sphere", "cylinder", "vase"])
@@ -146,13 +153,12 @@ def test_a_figure_comes_back_along_any_motion(gap: float):
 
 def test_a_held_pair_is_good_though_it_has_no_information():
     pair = noisy_pair("creature", 80.0)
-    tolerance = CONFIG.tolerance_diameters[2] * pair.diameter
-    option = alternative_at(*pair.fields, pair.i_from_j, tolerance)
+    option = pair.problem().evaluate(pair.i_from_j)
     # As if noise had drowned all but the firmest direction.
     blind = CONFIG.model_copy(update={"min_observability": 0.5})
-    result = result_of(0, 1, *pair.fields, (option,), pair.diameter, blind)
+    result = result_of(pair.problem(blind), (option,))
     assert observability_of(result.information) < 0.5
     assert result.kind is PairKind.GOOD and result.sliding is None
     twice = (option, replace(option, i_from_j=pair.i_from_j @ Pose.exp([0.5, 0, 0, 0, 0, 0])))
-    unsure = result_of(0, 1, *pair.fields, twice, pair.diameter, blind)
+    unsure = result_of(pair.problem(blind), twice)
     assert unsure.kind is PairKind.SLIDING and unsure.margin < CONFIG.min_margin

@@ -1,25 +1,28 @@
 """What is given beforehand, on drawn pairs with known truth: axes, weights of start poses."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanweld.config import GraphConfig, PairsConfig
+from scanweld.config import PairsConfig
+from scanweld.evidence.field import ScanField
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.graph.assemble import build_view_graph
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
-from scanweld.knowledge.given import Given, pairs_as_given, with_given
+from scanweld.knowledge.by_index import IndexedKnowledge
 from scanweld.knowledge.turntable import Turntable, find_turntable, off_axis_doubts
+from scanweld.knowledge.usable_pairs import LenientVerdict, usable_pairs, with_found_pairs
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
 from tests.prepared import creature_pair
 from tests.view_graphs import (
     CENTRE,
+    SAME,
     WEAK,
     Pairs,
     exact_pair,
@@ -28,14 +31,12 @@ from tests.view_graphs import (
     only_component,
     option,
     pair_of,
+    problem_of,
     scans_of,
-    stay,
     turn_about_centre,
     turned,
     world_of,
 )
-
-NEAR = (5.0, 0.03)
 
 
 def table_of(angles_deg: Sequence[float], seed: int = 0) -> tuple[list[Pose], Pose]:
@@ -48,7 +49,7 @@ def table_of(angles_deg: Sequence[float], seed: int = 0) -> tuple[list[Pose], Po
 
 def axis_of(pairs: Pairs, num_scans: int) -> Turntable | None:
     frames = [[Pose.identity()] * num_scans]
-    return find_turntable(pairs, frames, [CENTRE] * num_scans, NEAR)
+    return find_turntable(pairs, frames, [CENTRE] * num_scans, SAME)
 
 
 def every_edge(num_scans: int) -> list[Edge]:
@@ -101,7 +102,7 @@ def test_the_axis_is_found_in_the_frames_of_the_files_where_the_sensors_have_non
     pairs = exact_pairs(every_edge(4), [w @ f for w, f in zip(world, files, strict=True)])
     made_up = [Pose.identity()] * 4
     assert axis_of(pairs, 4) is None
-    found = find_turntable(pairs, [made_up, files], [CENTRE] * 4, NEAR)
+    found = find_turntable(pairs, [made_up, files], [CENTRE] * 4, SAME)
     assert_axis(found, sensor_from_axis)
 
 
@@ -133,25 +134,35 @@ def test_final_poses_off_the_axis_are_doubtful():
     assert found is not None
     slid = [*world[:3], world[3] @ turn_about_centre(2.0)]
     component = Component(poses=dict(enumerate(slid)), reference=0)
-    graph = ViewGraph(pairs=pairs, accepted={}, rejected={}, components=(component,), unplaced={})
+    graph = ViewGraph(
+        pairs=pairs, usable=pairs, accepted={}, rejected={}, components=(component,), unplaced={}
+    )
     doubts = off_axis_doubts(graph, found)
     assert set(doubts) == {3} and "deg off the axis" in doubts[3]
     right = replace(graph, components=(replace(component, poses=dict(enumerate(world))),))
     assert not off_axis_doubts(right, found)
 
 
-def placed(world: Sequence[Pose], pairs: Pairs, known: Given, table: Turntable | None) -> ViewGraph:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AsUsual(LenientVerdict):
+    """Leaves every pair as it is."""
+
+    pairs: Pairs
+    fields: Sequence[ScanField] = ()
+    diameter: float = 1.0
+    config: PairsConfig = field(default_factory=PairsConfig)
+
+    def classify(self, edge: Edge, alternatives: object) -> PairResult:
+        return self.pairs[edge]
+
+
+def placed(
+    world: Sequence[Pose], pairs: Pairs, known: IndexedKnowledge, table: Turntable | None
+) -> ViewGraph:
     """The view graph of what is given; nothing is easier than usual."""
-
-    def as_usual(edge: Edge, alternatives: object) -> PairResult:
-        return pairs[edge]
-
-    centres = [CENTRE] * len(world)
-    usable = pairs_as_given(pairs, known, table, as_usual)
-    graph = build_view_graph(
-        len(world), usable, centres, 1.0, judge_of(world, pairs), stay, GraphConfig(), known.apart
-    )
-    return with_given(graph, pairs, known)
+    usable = usable_pairs(pairs, known, table, AsUsual(pairs=pairs))
+    problem = problem_of(len(world), usable, judge_of(world, pairs), apart=known.apart)
+    return with_found_pairs(build_view_graph(problem), pairs, known)
 
 
 def test_a_rival_off_the_axis_is_none():
@@ -163,7 +174,7 @@ def test_a_rival_off_the_axis_is_none():
     pairs[0, 3] = pair_of(0, 3, PairKind.AMBIGUOUS, wrong, true)
     pairs[1, 3] = exact_pair(1, 3, world, WEAK, PairKind.NO_OVERLAP)
     table = axis_of(pairs, 4)
-    graph = placed(world, pairs, Given(turntable=True), table)
+    graph = placed(world, pairs, IndexedKnowledge(turntable=True), table)
     assert scans_of(only_component(graph, world)) == {0, 1, 2, 3}
     assert graph.accepted[0, 3] is true and graph.pairs is pairs
 
@@ -185,7 +196,7 @@ def test_start_poses_are_one_voice_however_many_pairs_they_speak_for(
     """Weak pairs place a scan where they say the same, found separately; start poses are not."""
     world = world_of(3)
     pairs = weak_triangle(world, num_given=num_given)
-    graph = placed(world, pairs, Given(), None)
+    graph = placed(world, pairs, IndexedKnowledge(), None)
     (component,) = graph.components
     assert len(component.poses) == num_placed
 
@@ -194,7 +205,7 @@ def test_pairs_apart_are_not_joined_by_others():
     """0-1-2-3, all good; 0 and 3 are apart but would lie on each other."""
     world = world_of(4)
     pairs = exact_pairs([(0, 1), (1, 2), (2, 3), (0, 3)], world)
-    graph = placed(world, pairs, Given(apart=frozenset({(0, 3)})), None)
+    graph = placed(world, pairs, IndexedKnowledge(apart=frozenset({(0, 3)})), None)
     for component in graph.components:
         assert not {0, 3} <= set(component.poses)
     assert graph.rejected[0, 3] == "said to be apart"
@@ -206,7 +217,7 @@ def test_the_first_fixed_scan_is_the_reference():
     pairs = exact_pairs([(0, 1), (1, 2), (2, 3)], world)
     place = Pose.exp([0.1, 0.2, 0.3, 4, 5, 6])
     fixed = {3: place, 1: Pose.identity()}
-    graph = placed(world, pairs, Given(fixed=fixed), None)
+    graph = placed(world, pairs, IndexedKnowledge(fixed=fixed), None)
     component = only_component(graph, world)
     assert component.reference == 3 and component.world_from_scan is place
     assert component.poses[3].angle_deg() == 0.0
@@ -221,8 +232,7 @@ def test_a_start_pose_is_marked_unless_the_search_finds_it_too(num_anchors: int)
     sets = [(first, second)]
     start = pair.i_from_j @ turn_about_centre(1.0)
     alone, result = (
-        register_pair(0, 1, *pair.fields, sets, pair.diameter, config, None, given_pose)
-        for given_pose in (None, start)
+        register_pair(pair.problem(config), sets, None, given_pose) for given_pose in (None, start)
     )
     found = [option for option in alone.alternatives if pair.off_by(option.i_from_j)[0] < 5]
     right = [option for option in result.alternatives if pair.off_by(option.i_from_j)[0] < 5]

@@ -1,0 +1,108 @@
+"""The judge of a run: what the sensors say of any pair of its scans at any pose."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+from scanweld.evidence.edges import evidence_off_edges, with_wide_edges
+from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.patches import PixelConsensus, pixel_consensus
+from scanweld.evidence.pixels import see
+from scanweld.evidence.visibility import evidence_at_poses, mean_evidence
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+
+NUM_JUDGED_SAMPLES = 300
+"""Samples of a scan that judge merges and refinements: thousands of poses are asked about."""
+
+Poses = Mapping[int, Pose]
+"""component_from_sensor of a component's scans, by index."""
+
+
+class PairJudge(Protocol):
+    """What the stages after the pairs ask: how well scans fit at a pose, by index."""
+
+    def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
+        """Mean evidence of both directions at a pose between the sensor frames."""
+        ...
+
+    def poses(self, i: int, j: int, i_from_j: Sequence[Pose]) -> list[Evidence]:
+        """The same at several poses."""
+        ...
+
+    def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
+        """The same, samples before the edges of what the other sensor saw being unknown."""
+        ...
+
+    def pixels(self, a: Poses, b: Poses) -> list[PixelConsensus]:
+        """What two components' sensors say of all pixels of each other's scans, a's scans first.
+
+        The poses of both are in one frame.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judge:
+    """The scans of a run, laid out, and the tolerances by which they are compared.
+
+    Attributes:
+        fields: The scans, laid out.
+        diameter: Diameter of the run, in the scans' unit.
+        tolerance: Depth tolerance of the evidence, in the scans' unit.
+    """
+
+    fields: Sequence[ScanField]
+    diameter: float
+    tolerance: float
+
+    @cached_property
+    def centres(self) -> list[FloatArray]:
+        """(3,) middle of each scan's samples, sensor frame."""
+        return [field.centre for field in self.fields]
+
+    @cached_property
+    def _with_wide_edges(self) -> dict[int, ScanField]:
+        return {}
+
+    def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
+        """Mean evidence of both directions at a pose between the sensor frames."""
+        (evidence,) = self.poses(i, j, [i_from_j])
+        return evidence
+
+    def poses(self, i: int, j: int, i_from_j: Sequence[Pose]) -> list[Evidence]:
+        """The same at several poses, in one call of the kernel."""
+        both = evidence_at_poses(
+            self.fields[i], self.fields[j], i_from_j, self.tolerance, NUM_JUDGED_SAMPLES
+        )
+        return [mean_evidence(*directions) for directions in both]
+
+    def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
+        """The same, samples before the edges of what the other sensor saw being unknown."""
+        return evidence_off_edges(
+            (self.fields[i], self._widened(i)),
+            (self.fields[j], self._widened(j)),
+            i_from_j,
+            self.tolerance,
+            NUM_JUDGED_SAMPLES,
+        )
+
+    def pixels(self, a: Poses, b: Poses) -> list[PixelConsensus]:
+        """What two components' sensors say of all pixels of each other's scans, a's scans first.
+
+        The poses of both are in one frame.
+        """
+        seen = {
+            (i, j): see(self.fields[i], self.fields[j], a[i].inverse() @ b[j], self.diameter)
+            for i in a
+            for j in b
+        }
+        of_a = [pixel_consensus([seen[i, j][0] for j in b], self.tolerance) for i in a]
+        return of_a + [pixel_consensus([seen[i, j][1] for i in a], self.tolerance) for j in b]
+
+    def _widened(self, k: int) -> ScanField:
+        if k not in self._with_wide_edges:
+            self._with_wide_edges[k] = with_wide_edges(self.fields[k], self.tolerance)
+        return self._with_wide_edges[k]

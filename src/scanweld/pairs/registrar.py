@@ -1,0 +1,92 @@
+"""Registers the pairs of a run: the search, then the best poses refined."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from scanweld.config import Config
+from scanweld.evidence.judge import Judge
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
+from scanweld.heat.features import Features
+from scanweld.pairs.anchors import pair_anchors
+from scanweld.pairs.hypotheses import Anchors
+from scanweld.pairs.polish import JointPolish
+from scanweld.pairs.problem import PairProblem
+from scanweld.pairs.register import register_pair
+from scanweld.pairs.result import PairResult
+from scanweld.refinement.refine import ContourMatcher
+
+Edge = tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class PairRegistrar:
+    """All that registering any pair of a run takes.
+
+    Attributes:
+        scans: All scans.
+        anchors: Sets of anchors of each scan.
+        judge: The scans laid out, with the diameter of the run.
+        contours: Finds contour matches of two scans.
+        config: Settings.
+        starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
+    """
+
+    scans: Sequence[PreparedScan]
+    anchors: Sequence[tuple[Anchors, ...]]
+    judge: Judge
+    contours: ContourMatcher
+    config: Config
+    starts: Mapping[Edge, Pose] = field(default_factory=dict)
+
+    def problem(self, edge: Edge) -> PairProblem:
+        """The two scans of a pair (i, j), i < j."""
+        i, j = (self.judge.fields[k] for k in edge)
+        config = self.config.pairs
+        return PairProblem(edge=edge, i=i, j=j, diameter=self.judge.diameter, config=config)
+
+    def register(self, edge: Edge) -> PairResult:
+        """Register a pair (i, j), i < j, from any start pose."""
+        i, j = edge
+        polish = JointPolish(
+            scans=self.scans,
+            edge=edge,
+            centre_j=self.judge.fields[j].centre,
+            diameter=self.judge.diameter,
+            contours=self.contours,
+            config=self.config.refine,
+        )
+        both = list(zip(self.anchors[i], self.anchors[j], strict=True))
+        return register_pair(self.problem(edge), both, polish, self.starts.get(edge))
+
+
+def pair_registrar(
+    scans: Sequence[PreparedScan],
+    features: Sequence[Features | None],
+    judge: Judge,
+    contours: ContourMatcher,
+    config: Config,
+    starts: Mapping[Edge, Pose] | None = None,
+) -> PairRegistrar:
+    """What registers any pair of the given scans.
+
+    Args:
+        scans: All scans.
+        features: Their PA-HKS keypoints, or None.
+        judge: The scans laid out, with the diameter of the run.
+        contours: Finds contour matches of two scans.
+        config: Settings.
+        starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
+    """
+    anchors = [
+        pair_anchors(field, found, config.pairs)
+        for field, found in zip(judge.fields, features, strict=True)
+    ]
+    return PairRegistrar(
+        scans=scans,
+        anchors=anchors,
+        judge=judge,
+        contours=contours,
+        config=config,
+        starts=starts or {},
+    )
