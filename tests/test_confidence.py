@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scanweld.confidence.assess import MAX_UNDECIDED_CONFIDENCE, assess
+from scanweld.confidence.assess import MAX_UNDECIDED_CONFIDENCE, Confidence, assess
 from scanweld.confidence.diagnostics import Fit, PairDiagnostics, diagnostics_of
 from scanweld.confidence.joint_evidence import joint_evidence
 from scanweld.confidence.misfit import misfit, sure_offsets
@@ -285,6 +285,40 @@ def test_confidence_knows_no_unit_and_no_order():
     believed = planted(pair, pair.i_from_j)
     assert planted(larger, larger.i_from_j) == pytest.approx(believed, abs=1e-6)
     assert planted(turned_round, turned_round.i_from_j) == pytest.approx(believed, abs=1e-6)
+
+
+def test_a_rival_that_facts_rule_out_counts_for_nothing():
+    """Two poses fit; users' facts leave one, with which the view graph was built."""
+    pair = creature_pair(40)
+    problem = pair.problem()
+    best = problem.evaluate(pair.i_from_j)
+    half_turn = Pose(rotation=np.diag([-1.0, -1.0, 1.0]), translation=np.zeros(3))
+    rival = replace(best, i_from_j=half_turn @ pair.i_from_j)
+    found = replace(result_of(problem, (best, rival)), kind=PairKind.AMBIGUOUS)
+    usable = result_of(problem, (best,))
+    assert found.margin == 0.0 and usable.margin == 1.0
+    component = Component(poses={0: Pose.identity(), 1: pair.i_from_j}, reference=0)
+    diagnostics = diagnostics_of(pair.scans, pair.judge(), CONFIG.contours)
+
+    def assessed(used: PairResult) -> Confidence:
+        graph = ViewGraph(
+            pairs={(0, 1): found},
+            usable={(0, 1): used},
+            accepted={(0, 1): best},
+            rejected={},
+            components=(component,),
+            unplaced={},
+        )
+        return assess(graph, diagnostics, stored_calibration(), CONFIG)
+
+    undecided, decided = assessed(found), assessed(usable)
+    assert undecided.pairs[0, 1].grounds["margin"] == 0.0
+    assert undecided.pairs[0, 1].confidence <= MAX_UNDECIDED_CONFIDENCE
+    assert decided.pairs[0, 1].grounds["margin"] == 1.0
+    assert decided.pairs[0, 1].confidence > 0.9
+    for k in (0, 1):
+        assert undecided.scans[k].confidence <= MAX_UNDECIDED_CONFIDENCE
+        assert decided.scans[k].confidence > MAX_UNDECIDED_CONFIDENCE
 
 
 @pytest.mark.parametrize("kind", [kind for kind in PairKind if kind is not PairKind.GOOD])

@@ -11,6 +11,7 @@ import pytest
 
 from scanweld.app.outputs import report_json
 from scanweld.app.summary import summary
+from scanweld.confidence.assess import MAX_UNDECIDED_CONFIDENCE
 from scanweld.config import Config, FusionConfig, PairsConfig, PrepareConfig
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
@@ -303,10 +304,11 @@ def test_apart_holds_where_nothing_lays_the_scans_together():
 
 
 def test_a_turntable_supports_a_thin_pair():
-    scene = seen_from(42, 100, 150, 300)
+    scene = seen_from(42, 100, 150, 303)
     assert set(run(scene.scans, None, THOROUGH).unplaced) == {"scan_04"}
     result = run(scene.scans, Knowledge(turntable=True), THOROUGH)
     assert result.verdict is not Verdict.PARTIAL and len(result.poses) == 4
+    assert (result.scans["scan_04"].confidence or 0.0) > MAX_UNDECIDED_CONFIDENCE
     for scan in scene.scans[1:]:
         assert_right(result, scene, FIRST, scan.name)
     assert verdicts(result) == {"turntable": FactVerdict.HELD}

@@ -57,11 +57,15 @@ def assess(
     for component in graph.components:
         joint = joint_evidence(graph, component, diagnostics)
         homes.update(dict.fromkeys(component.poses, joint))
-    pairs = {
-        edge: _assess_pair(result, chosen, graph, homes, diagnostics, calibration, config)
-        for edge, result in graph.pairs.items()
-        if (chosen := graph.accepted.get(edge) or result.best) is not None
-    }
+    pairs = {}
+    for edge, found in graph.pairs.items():
+        # Where users' facts leave a pair no pose, what was found is assessed.
+        usable = graph.usable[edge]
+        result = found if usable.best is None else usable
+        chosen = graph.accepted.get(edge) or result.best
+        if chosen is not None:
+            judged = result, chosen
+            pairs[edge] = _assess_pair(*judged, graph, homes, diagnostics, calibration, config)
     return Confidence(pairs=pairs, scans=_assess_scans(graph, homes, pairs, calibration, config))
 
 
@@ -109,8 +113,7 @@ def _assess_pair(
     fit = diagnostics.fit(result.i, result.j, chosen.i_from_j, at_contours=at_contours)
     grounds = pair_grounds(result, chosen, fit, joint, is_accepted)
     probability = calibration.pair.probability(grounds)
-    if (result.i, result.j) not in graph.remarks:
-        probability = cap_undecided(probability, result, grounds, config)
+    probability = cap_undecided(probability, result, grounds, config)
     if result.rests_on_feature:
         probability = min(probability, MAX_UNDECIDED_CONFIDENCE)
     return Assessed(confidence=probability, grounds=grounds)

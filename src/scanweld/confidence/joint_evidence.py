@@ -104,7 +104,7 @@ def _standing(
     judge = diagnostics.judge
     same = PoseTolerance(angle_deg=RIVAL_ANGLE_DEG, shift=RIVAL_SHIFT_DIAMETERS * judge.diameter)
     alone = {k: Pose.identity()}
-    merges = propose_merges(others, alone, graph.pairs, judge.centres, same, judge)
+    merges = propose_merges(others, alone, graph.usable, judge.centres, same, judge)
     said = _said_of(k, between)
     here = Merge(
         a_from_b=poses[k],

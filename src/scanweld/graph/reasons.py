@@ -81,7 +81,7 @@ def _agreed(said: Sequence[Said]) -> tuple[Said | None, int]:
 
 def _rest_on_feature_alone(graph: ViewGraph, component: Component) -> set[int]:
     """Scans of a component that no good pairs join to most of it, but a mark alone."""
-    inside = {edge: graph.pairs[edge] for edge in graph.accepted if edge[0] in component.poses}
+    inside = {edge: graph.usable[edge] for edge in graph.accepted if edge[0] in component.poses}
     if not any(result.rests_on_feature for result in inside.values()):
         return set()
     groups = [{k} for k in component.poses]
