@@ -30,7 +30,7 @@ class PreparedPair:
         """The pair as the search is asked."""
         i, j = self.fields
         config = config or PairsConfig()
-        return PairProblem(edge=(0, 1), i=i, j=j, diameter=self.diameter, config=config)
+        return PairProblem(edge=(0, 1), i=i, j=j, config=config)
 
     def judge(self) -> Judge:
         """The two scans as later stages ask them."""
@@ -49,7 +49,7 @@ def prepared_pair(i: RangeScan, j: RangeScan, true_i_from_j: Pose) -> PreparedPa
     diameter = float(np.median([a.diameter, b.diameter]))
     return PreparedPair(
         scans=(a, b),
-        fields=(make_field(a, diameter), make_field(b, diameter)),
+        fields=(make_field(a), make_field(b)),
         i_from_j=a.scan_from_sensor.inverse() @ true_i_from_j @ b.scan_from_sensor,
         diameter=diameter,
     )

@@ -216,7 +216,7 @@ def test_what_is_right_is_believed_and_what_is_wrong_is_not():
         true = scene.i_from_j(names.index(pair.i), names.index(pair.j))
         is_right = (true.inverse() @ pair.i_from_j).angle_deg() < 5
         assert pair.confidence > 0.5 if is_right and pair.accepted else True
-        assert is_right or pair.confidence < 0.35
+        assert is_right or pair.confidence < MAX_UNDECIDED_CONFIDENCE
 
 
 def test_confidence_knows_no_names_and_workers():

@@ -20,6 +20,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet
 from scanweld.pairs import registrar
+from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import PairResult
 from scanweld.pipeline import run as pipeline
 from scanweld.pipeline import stages as steps
@@ -155,6 +156,21 @@ class Memory:
     def put(self, key: str, value: object) -> None:
         self.num_put += 1
         self.kept[key] = value
+
+
+def test_one_more_scan_redoes_no_pair_that_it_is_not_in(monkeypatch: pytest.MonkeyPatch):
+    scans, memory, edges = few(), Memory(), []
+    register = registrar.register_pair
+
+    def counted(problem: PairProblem, *arguments: Any) -> PairResult:
+        edges.append(problem.edge)
+        return register(problem, *arguments)
+
+    monkeypatch.setattr(registrar, "register_pair", counted)
+    run(scans[:3], cache=memory)
+    assert len(edges) == 3
+    run(scans, cache=memory)
+    assert len(edges) == 6
 
 
 def test_a_second_run_recomputes_nothing(monkeypatch: pytest.MonkeyPatch):

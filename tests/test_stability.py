@@ -39,13 +39,17 @@ class DrawnProblem(PairProblem):
 
     drawn: Callable[[Sequence[Pose]], list[Alternative]]
 
+    @property
+    def diameter(self) -> float:
+        return DIAMETER
+
     def refine(self, poses: Sequence[Pose]) -> list[Alternative]:
         return self.drawn(poses)
 
 
 def drawn_problem(refine: Callable[[Sequence[Pose]], list[Alternative]]) -> DrawnProblem:
     i, j = creature_pair(40.0).fields
-    return DrawnProblem(edge=(0, 1), i=i, j=j, diameter=DIAMETER, config=CONFIG, drawn=refine)
+    return DrawnProblem(edge=(0, 1), i=i, j=j, config=CONFIG, drawn=refine)
 
 
 def held(information: FloatArray, ends: Sequence[tuple[float, float]]) -> bool:

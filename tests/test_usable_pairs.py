@@ -149,7 +149,6 @@ class AsUsual(LenientVerdict):
 
     pairs: Pairs
     fields: Sequence[ScanField] = ()
-    diameter: float = 1.0
     config: PairsConfig = field(default_factory=PairsConfig)
 
     def classify(self, edge: Edge, alternatives: object) -> PairResult:

@@ -21,6 +21,7 @@ class ScanField:
     """What pair registration asks of a scan, in its sensor frame, as plain arrays.
 
     Attributes:
+        diameter: Diameter of the scan, in its unit.
         camera: (5,) parameters of the range image's camera.
         raster: (H, W, 6) float32 depth, normal, outside, kind of each pixel.
         points: (N, 3) evenly spread samples, any prefix of which is evenly spread too.
@@ -31,6 +32,7 @@ class ScanField:
         origin: (4,) centre of voxel (0, 0, 0), and the voxels' edge.
     """
 
+    diameter: float
     camera: FloatArray
     raster: NDArray[np.float32]
     points: FloatArray
@@ -41,11 +43,12 @@ class ScanField:
     origin: FloatArray
 
 
-def make_field(scan: PreparedScan, diameter: float) -> ScanField:
-    """Lay out a scan; lengths follow the diameter of the run, so that all scans are alike."""
+def make_field(scan: PreparedScan) -> ScanField:
+    """Lay out a scan; lengths follow its own diameter, so that no other scan changes it."""
     samples = scan.samples
-    surface, closest, origin = _closest_points(scan, diameter)
+    surface, closest, origin = _closest_points(scan)
     return ScanField(
+        diameter=scan.diameter,
         camera=scan.image.camera.parameters,
         raster=_raster(scan.image),
         points=np.array(samples.points),
@@ -67,13 +70,13 @@ def _raster(image: RangeImage) -> NDArray[np.float32]:
 
 
 def _closest_points(
-    scan: PreparedScan, diameter: float
+    scan: PreparedScan,
 ) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
     """One surface point for each occupied voxel, and for each voxel the nearest occupied one."""
-    edge = VOXEL_DIAMETERS * diameter
+    edge = VOXEL_DIAMETERS * scan.diameter
     vertices, off_rim = scan.mesh.vertices, ~scan.image.is_rim[np.isfinite(scan.image.depth)]
-    origin = vertices.min(axis=0) - GRID_MARGIN_DIAMETERS * diameter
-    span = vertices.max(axis=0) + GRID_MARGIN_DIAMETERS * diameter - origin
+    origin = vertices.min(axis=0) - GRID_MARGIN_DIAMETERS * scan.diameter
+    span = vertices.max(axis=0) + GRID_MARGIN_DIAMETERS * scan.diameter - origin
     shape = np.ceil(span / edge).astype(np.int64) + 1
     cell = np.rint((vertices - origin) / edge).astype(np.int64)
     flat = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]

@@ -27,12 +27,10 @@ class LenientVerdict:
 
     Attributes:
         fields: The scans, laid out.
-        diameter: Diameter of the run, in the scans' unit.
         config: The usual settings.
     """
 
     fields: Sequence[ScanField]
-    diameter: float
     config: PairsConfig
 
     def classify(self, edge: Edge, alternatives: tuple[Alternative, ...]) -> PairResult:
@@ -44,7 +42,7 @@ class LenientVerdict:
             }
         )
         i, j = (self.fields[k] for k in edge)
-        problem = PairProblem(edge=edge, i=i, j=j, diameter=self.diameter, config=lenient)
+        problem = PairProblem(edge=edge, i=i, j=j, config=lenient)
         return result_of(problem, alternatives)
 
 

@@ -24,21 +24,26 @@ NUM_FINE_SAMPLES = 400
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class PairProblem:
-    """Two scans, how large their object is, and the settings by which poses are judged.
+    """Two scans, and the settings by which poses are judged.
+
+    Nothing here depends on the rest of the set, so that a pair is worked on once whatever it is in.
 
     Attributes:
         edge: Indices (i, j) of the scans, i < j.
         i: The first scan, laid out.
         j: The second.
-        diameter: Diameter of the object, in the scans' unit.
         config: Settings.
     """
 
     edge: tuple[int, int]
     i: ScanField
     j: ScanField
-    diameter: float
     config: PairsConfig
+
+    @property
+    def diameter(self) -> float:
+        """Diameter of the object as these two scans show it, in their unit: the mean of theirs."""
+        return 0.5 * (self.i.diameter + self.j.diameter)
 
     @property
     def tolerance(self) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scanweld.config import Config
-from scanweld.evidence.judge import Judge
+from scanweld.evidence.field import ScanField
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features
@@ -26,7 +26,7 @@ class PairRegistrar:
     Attributes:
         scans: All scans.
         anchors: Sets of anchors of each scan.
-        judge: The scans laid out, with the diameter of the run.
+        fields: The scans, laid out.
         contours: Finds contour matches of two scans.
         config: Settings.
         starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
@@ -34,36 +34,37 @@ class PairRegistrar:
 
     scans: Sequence[PreparedScan]
     anchors: Sequence[tuple[Anchors, ...]]
-    judge: Judge
+    fields: Sequence[ScanField]
     contours: ContourMatcher
     config: Config
     starts: Mapping[Edge, Pose] = field(default_factory=dict)
 
     def problem(self, edge: Edge) -> PairProblem:
         """The two scans of a pair (i, j), i < j."""
-        i, j = (self.judge.fields[k] for k in edge)
+        i, j = (self.fields[k] for k in edge)
         config = self.config.pairs
-        return PairProblem(edge=edge, i=i, j=j, diameter=self.judge.diameter, config=config)
+        return PairProblem(edge=edge, i=i, j=j, config=config)
 
     def register(self, edge: Edge) -> PairResult:
         """Register a pair (i, j), i < j, from any start pose."""
         i, j = edge
+        problem = self.problem(edge)
         polish = JointPolish(
             scans=self.scans,
             edge=edge,
-            centre_j=self.judge.fields[j].centre,
-            diameter=self.judge.diameter,
+            centre_j=problem.j.centre,
+            diameter=problem.diameter,
             contours=self.contours,
             config=self.config.refine,
         )
         both = list(zip(self.anchors[i], self.anchors[j], strict=True))
-        return register_pair(self.problem(edge), both, polish, self.starts.get(edge))
+        return register_pair(problem, both, polish, self.starts.get(edge))
 
 
 def pair_registrar(
     scans: Sequence[PreparedScan],
     features: Sequence[Features | None],
-    judge: Judge,
+    fields: Sequence[ScanField],
     contours: ContourMatcher,
     config: Config,
     starts: Mapping[Edge, Pose] | None = None,
@@ -73,19 +74,19 @@ def pair_registrar(
     Args:
         scans: All scans.
         features: Their PA-HKS keypoints, or None.
-        judge: The scans laid out, with the diameter of the run.
+        fields: The scans, laid out.
         contours: Finds contour matches of two scans.
         config: Settings.
         starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
     """
     anchors = [
         pair_anchors(field, found, config.pairs)
-        for field, found in zip(judge.fields, features, strict=True)
+        for field, found in zip(fields, features, strict=True)
     ]
     return PairRegistrar(
         scans=scans,
         anchors=anchors,
-        judge=judge,
+        fields=fields,
         contours=contours,
         config=config,
         starts=starts or {},

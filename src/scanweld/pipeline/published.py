@@ -75,7 +75,6 @@ class _PublishedRegistrar:
             edge=edge,
             i=judge.fields[i],
             j=judge.fields[j],
-            diameter=judge.diameter,
             config=self.config.pairs,
         )
         return judge_pose(problem, fine[i].inverse() @ fine[j])

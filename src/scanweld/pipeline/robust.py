@@ -21,7 +21,7 @@ def robust_method(scene: Scene, config: Config) -> Method:
     scans = scene.intake.prepared
     contours = contour_matcher(scans, config.contours)
     starts = scene.intake.known.starts
-    registrar = pair_registrar(scans, scene.features, scene.judge, contours, config, starts)
+    registrar = pair_registrar(scans, scene.features, scene.judge.fields, contours, config, starts)
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
     def settle(poses: Poses) -> Poses:

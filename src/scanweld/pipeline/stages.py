@@ -53,9 +53,7 @@ def lay_out(intake: Intake, config: Config, stages: Stages) -> Judge:
     """Every scan as the arrays that the kernels take, and who judges any two of them."""
     with stages.stage("lay out") as counts:
         counts["scans"] = len(intake.prepared)
-        fields = stages.each(
-            "lay out", lambda scan: make_field(scan, intake.diameter), intake.prepared
-        )
+        fields = stages.each("lay out", make_field, intake.prepared)
     tolerance = config.pairs.fine_tolerance_diameters * intake.diameter
     return Judge(fields=fields, diameter=intake.diameter, tolerance=tolerance)
 
@@ -69,7 +67,7 @@ def register_pairs(scene: Scene, method: Method, stages: Stages) -> dict[Edge, P
         hashes = [intake.prepared[k].work_hash for k in edge]
         start = intake.known.start_key(edge)
         what = f"{method.name} pair"
-        return work_key(what, RESULT_FORMAT, *hashes, intake.diameter, *method.settings, *start)
+        return work_key(what, RESULT_FORMAT, *hashes, *method.settings, *start)
 
     with stages.stage("pairs") as counts:
         results = stages.each("pairs", method.register, edges, key)
@@ -112,7 +110,7 @@ def place_scans(
     """
     judge, known = scene.judge, scene.intake.known
     with stages.stage("graph") as counts:
-        verdict = LenientVerdict(fields=judge.fields, diameter=judge.diameter, config=config.pairs)
+        verdict = LenientVerdict(fields=judge.fields, config=config.pairs)
         problem = GraphProblem(
             pairs=usable_pairs(found, known, axis, verdict),
             centres=judge.centres,

@@ -125,7 +125,7 @@ def _register_by_evidence(
     Signatures only say where keypoints are. The start poses and the answer are those that the
     visibility evidence speaks for most.
     """
-    field_i, field_j = make_field(i, i.diameter), make_field(j, i.diameter)
+    field_i, field_j = make_field(i), make_field(j)
     anchors_i = Anchors(points=features_i.points, normals=features_i.normals)
     anchors_j = Anchors(points=features_j.points, normals=features_j.normals)
     coarse, middle = (share * i.diameter for share in EVIDENCE_DIAMETERS)
