@@ -96,7 +96,7 @@ def test_same_bytes_twice():
 def test_blocks_without_a_surface_change_nothing(monkeypatch: pytest.MonkeyPatch):
     """Taken a block at a time, many of the blocks hold nothing to draw."""
     expected = fuse(*sphere_scans(), CONFIG)
-    monkeypatch.setattr("scanweld.fusion.surface._CHUNK", 1)
+    monkeypatch.setattr("scanweld.fusion.surface.CHUNK", 1)
     mesh = fuse(*sphere_scans(), CONFIG)
     assert mesh.vertices.tobytes() == expected.vertices.tobytes()
     assert mesh.faces.tobytes() == expected.faces.tobytes()

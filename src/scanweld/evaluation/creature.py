@@ -127,8 +127,7 @@ _LIMBS = (
 )
 
 _TRUNK_LENGTH = 100.0
-_JOINT_SPREAD = 0.04
-_RADIUS_SPREAD = 0.12
+"""Length of the figure's trunk, in the unit of the mesh (say millimetres)."""
 
 
 def creature(seed: int = 0, *, voxels: int = 200) -> TriangleMesh:
@@ -158,17 +157,18 @@ def creature(seed: int = 0, *, voxels: int = 200) -> TriangleMesh:
 
 def _varied(limbs: tuple[Limb, ...], seed: int) -> tuple[Limb, ...]:
     """Other proportions and another stance; parts that meet move together."""
+    joint_spread, radius_spread = 0.1, 0.12
     rng = np.random.default_rng(seed)
     waves = rng.normal(size=(3, 3))
     phases = rng.uniform(0, 2 * np.pi, size=3)
 
     def moved(joint: Point) -> Point:
-        shift = 2.5 * _JOINT_SPREAD * np.sin(4.0 * (waves @ np.array(joint)) + phases)
+        shift = joint_spread * np.sin(4.0 * (waves @ np.array(joint)) + phases)
         x, y, z = np.array(joint) + shift
         return float(x), float(y), float(z)
 
     def scaled(radii: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(float(r * np.exp(_RADIUS_SPREAD * rng.normal())) for r in radii)
+        return tuple(float(r * np.exp(radius_spread * rng.normal())) for r in radii)
 
     return tuple(
         Limb(joints=tuple(map(moved, limb.joints)), radii=scaled(limb.radii), blend=limb.blend)

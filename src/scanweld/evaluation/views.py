@@ -16,6 +16,7 @@ from scanweld.geometry.scan import principal_diameter
 Axis = Literal["x", "y", "z"]
 
 _MARGIN_PIXELS = 4
+"""Empty pixels around the object in a view's image."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

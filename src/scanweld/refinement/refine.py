@@ -8,6 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from scanweld.config import RefineConfig
+from scanweld.geometry.gauss_newton import lever_arm
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
@@ -101,7 +102,7 @@ def refine_poses(
             touching = {(min(i, j), max(i, j)) for i, j, _ in surface}
             contour = _match_contours(poses, sorted(touching & views), contour_matches)
         terms = weighted_terms(surface, contour, poses, config.contour_weight, noise)
-        poses, moved = move_poses(terms, poses, diameter / 3, MAX_STEP_DIAMETERS * diameter)
+        poses, moved = move_poses(terms, poses, lever_arm(diameter), MAX_STEP_DIAMETERS * diameter)
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
     surface = match_surfaces(sources, poses, config.match_diameters[1] * diameter)
