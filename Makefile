@@ -3,13 +3,24 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean benchmarks paper trust calibration
+.PHONY: demo test test-fast test-benchmarks lint clean benchmarks paper trust calibration
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
 
+# One process a core. Tests that lie together stay together, since they share their scenes.
+PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal --durations 10
+
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(PYTEST) --ignore tests/benchmarks
+
+# Without runs of the whole pipeline and of other processes: for every change.
+test-fast: $(VENV)/.installed-dev
+	$(PYTEST) --ignore tests/benchmarks -m "not slow"
+
+# What tests the code in benchmarks/, which needs more packages.
+test-benchmarks: $(VENV)/.installed-bench
+	$(PYTEST) tests/benchmarks
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
