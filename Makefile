@@ -8,18 +8,17 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
 
-# On all cores; whole files go to a worker, as their tests share scenes.
-PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile
+# One process a core. Tests that lie together stay together, since they share their scenes.
+PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal --durations 10
 
-# All tests of the package.
 test: $(VENV)/.installed-dev
 	$(PYTEST) --ignore tests/benchmarks
 
-# Without whole runs: what to run while working.
+# Without runs of the whole pipeline and of other processes: for every change.
 test-fast: $(VENV)/.installed-dev
 	$(PYTEST) --ignore tests/benchmarks -m "not slow"
 
-# What benchmarks compute and write, in their quick forms.
+# What tests the code in benchmarks/, which needs more packages.
 test-benchmarks: $(VENV)/.installed-bench
 	$(PYTEST) tests/benchmarks
 
