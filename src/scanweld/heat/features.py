@@ -78,9 +78,7 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
     try:
         eigenvalues, functions = eigenpairs(vertices, mesh.faces, config.num_modes, mesh.cold)
     except ArpackError as error:
-        logger.warning(
-            "%s: no heat keypoints, because the modes were not found (%s)", scan.name, error
-        )
+        logger.warning("%s: no heat keypoints, eigenproblem not solved (%s)", scan.name, error)
         return _no_features(config.num_times)
     times = _times(eigenvalues, config)
     signature = heat_signature(eigenvalues, functions, times)
