@@ -123,7 +123,7 @@ class CoarseConfig(Section):
     start: Literal["fit", "consensus", "evidence"] = "fit"
     """Start of the ICP: a fit to all matches, as published ("fit"). Not in the paper: the pose on
     which most of the nearest signatures agree ("consensus"), or the poses from pairs of keypoints
-    that the range images support best, whatever the signatures ("evidence")."""
+    that agree best with the range images, whatever the signatures ("evidence")."""
     num_nearest: int = Field(default=8, ge=1)
     """Nearest signatures that are tried for each keypoint in a consensus."""
 
