@@ -14,11 +14,11 @@ from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
+from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.color import exposure_gains
 from scanweld.fusion.noise import scan_noise
 from scanweld.fusion.posed_image import PosedImage, pose_image
 from scanweld.fusion.sheets import second_sheets, without_second_sheets
-from scanweld.fusion.support import Support
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals, smoothed_normals
 from scanweld.geometry.pose import Pose
@@ -193,7 +193,7 @@ def test_sheets_that_share_a_corner_are_two():
     plane = np.stack([x, y, np.zeros(9)], axis=1).astype(np.float64)
     vertices = np.concatenate([plane, plane - [0.0, 0.0, 1.5]])
     other = np.where(sheet == 0, 0, sheet + 9)
-    support = Support(count=np.repeat([2, 1], 9), stdev=np.full(18, 0.1))
+    support = Agreement(count=np.repeat([2, 1], 9), stdev=np.full(18, 0.1))
     faces = np.concatenate([sheet, other])
     joined = smoothed_normals(vertices, faces, 1)
     assert (second_sheets(vertices, faces, joined, 1.0) < 0).all()
