@@ -8,11 +8,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from typing import TypeVar
 
 from scanweld.config import Section
 from scanweld.work.progress import Cache, Progress, StageAdvanced, telling
+from scanweld.work.source import code_digest
 from scanweld.work.threads import map_in_order
 
 logger = logging.getLogger(__name__)
@@ -102,8 +102,8 @@ class Stages:
 
 
 def work_key(stage: str, *parts: str | float | Section) -> str:
-    """A hex key of a piece of work: the stage, its input's hashes, its settings, our version."""
-    told = [version("scanweld"), stage]
+    """A hex key of a piece of work: the stage, its input's hashes, its settings, and our code."""
+    told = [code_digest(), stage]
     told += [part.model_dump_json() if isinstance(part, Section) else repr(part) for part in parts]
     return hashlib.sha256("\n".join(told).encode()).hexdigest()
 
