@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean benchmarks paper trust calibration
+.PHONY: demo test lint docs clean benchmarks paper trust calibration
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
@@ -15,6 +15,10 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+# The documentation as a site, into site/; warnings are errors.
+docs: $(VENV)/.installed-docs
+	$(BIN)/mkdocs build --strict
 
 # The numbers of README.md and docs/benchmarks.md; needs the Stanford data, takes a quarter of an hour.
 benchmarks: $(VENV)/.installed-bench
@@ -43,7 +47,7 @@ calibration: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.trust --pages
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) demo site
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -56,4 +60,8 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 
 $(VENV)/.installed-bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,bench]'
+	touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	touch $@

@@ -3,6 +3,8 @@
 In short: ``scanweld.run(scanweld.read_scans("scans/"))``.
 """
 
+from importlib.metadata import version
+
 from scanweld.work import (
     kernels as kernels,  # first: it says where the kernels of the others are kept
 )
@@ -46,6 +48,8 @@ from scanweld.reconstruction import (
     Verdict,
 )
 from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+
+__version__ = version("scanweld")
 
 __all__ = [
     "Camera",
