@@ -3,13 +3,25 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs clean benchmarks paper trust calibration
+.PHONY: demo test test-fast test-benchmarks lint docs clean benchmarks paper trust calibration
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
 
+# On all cores; whole files go to a worker, as their tests share scenes.
+PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile
+
+# All tests of the package.
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(PYTEST) --ignore tests/benchmarks
+
+# Without whole runs: what to run while working.
+test-fast: $(VENV)/.installed-dev
+	$(PYTEST) --ignore tests/benchmarks -m "not slow"
+
+# What benchmarks compute and write, in their quick forms.
+test-benchmarks: $(VENV)/.installed-bench
+	$(PYTEST) tests/benchmarks
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -18,6 +18,8 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_poses, write_scan_ply
 from tests.scenes import Scene, creature_scene
 
+pytestmark = pytest.mark.slow
+
 GOOD = ["scan_01", "scan_02", "scan_03", "scan_04", "scan_05", "scan_06"]
 IN_MILLIMETRES = 1000.0
 

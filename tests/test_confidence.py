@@ -33,6 +33,8 @@ from scanweld.reconstruction import Reconstruction
 from tests.prepared import PreparedPair, creature_pair
 from tests.scenes import MILD_NOISE, Scene, creature_scene, pair_at_gap, primitive_scene
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=60))
 MODELS = {name: getattr(stored_calibration(), name) for name in ("pair", "scan")}
 

@@ -275,7 +275,7 @@ def test_too_few_contours_leave_the_pose():
 
 def test_contour_matcher_speaks_of_scans_by_number():
     pair = creature_pair(60)
-    matches = contour_matcher(pair.scans, CONFIG)(0, 1, pair.i_from_j.inverse())
+    matches = contour_matcher(pair.scans, CONFIG).matches(0, 1, pair.i_from_j.inverse())
     pixel = pair.scans[1].image.pixel
     assert len(matches) > 20
     assert np.abs(matches.residuals).max() <= 4 * pixel

@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+import pytest
 
 from scanweld.config import Config, FusionConfig
 from scanweld.evaluation.scanner import NoiseModel
@@ -10,6 +11,8 @@ from scanweld.pipeline.run import run
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 from tests.prepared import scaled
 from tests.scenes import creature_scene
+
+pytestmark = pytest.mark.slow
 
 TOO_LARGE = 1.015
 

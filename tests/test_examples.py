@@ -14,6 +14,8 @@ from scanweld.geometry.pose import Pose
 from scanweld.io import read_poses
 from tests.results import a_result
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 

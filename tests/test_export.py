@@ -31,6 +31,8 @@ from tests.command_line import error_line, scanweld
 from tests.results import stub_run
 from tests.scenes import Scene, primitive_scene, scene_of
 
+pytestmark = pytest.mark.slow
+
 NAMES = ["scan_01", "scan_02", "scan_03", "scan_04"]
 EVERY_POSE = [word for form in FORMATS for word in ("--poses", form)]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
@@ -15,11 +16,11 @@ from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
-from scanweld.fusion.cases import edge_corners, triangle_table
 from scanweld.fusion.surface import extract_surface
 from scanweld.fusion.volume import BLOCK, Volume
 from scanweld.geometry.camera import CameraModel
-from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.geometry.marching_cubes import edge_corners, isosurface, triangle_table
+from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.shading import render_shaded, side_by_side, write_png
@@ -96,7 +97,7 @@ def test_same_bytes_twice():
 def test_blocks_without_a_surface_change_nothing(monkeypatch: pytest.MonkeyPatch):
     """Taken a block at a time, many of the blocks hold nothing to draw."""
     expected = fuse(*sphere_scans(), CONFIG)
-    monkeypatch.setattr("scanweld.fusion.surface._CHUNK", 1)
+    monkeypatch.setattr("scanweld.fusion.surface.CHUNK", 1)
     mesh = fuse(*sphere_scans(), CONFIG)
     assert mesh.vertices.tobytes() == expected.vertices.tobytes()
     assert mesh.faces.tobytes() == expected.faces.tobytes()
@@ -233,6 +234,19 @@ def test_every_cell_case_is_closed_and_has_its_corners_on_the_right_side():
         np.testing.assert_array_equal(used, crossed)
 
 
+def test_a_dense_field_gives_a_closed_surface_at_its_zero():
+    """An ellipsoid in a grid of uneven shape, its inside negative: closed, and turned outward."""
+    middle, half = np.array([9.3, 12.1, 7.6]), np.array([6.2, 8.4, 5.1])
+    nodes = np.stack(np.meshgrid(*map(np.arange, (19, 25, 16)), indexing="ij"), axis=-1)
+    vertices, faces = isosurface(np.linalg.norm((nodes - middle) / half, axis=-1) - 1.0)
+    assert not len(border_edges(faces, len(vertices))[0])
+    np.testing.assert_allclose(np.linalg.norm((vertices - middle) / half, axis=1), 1.0, atol=0.02)
+    outward = face_normals(vertices, faces) * (vertices[faces].mean(axis=1) - middle)
+    assert (outward.sum(axis=1) > 0).all()
+    volume = np.linalg.det(vertices[faces] - middle).sum() / 6
+    assert volume == pytest.approx(4 / 3 * np.pi * half.prod(), rel=0.02)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_any_field_gives_a_manifold(seed: int):
     """White noise meets every case and every ambiguous face; blocks join without cracks."""
@@ -267,6 +281,4 @@ def test_pictures(tmp_path: Path):
     row = side_by_side([picture, picture[:40]])
     assert row.shape == (80, 160, 3)
     write_png(tmp_path / "row.png", row)
-    from skimage.io import imread
-
-    np.testing.assert_array_equal(imread(tmp_path / "row.png"), row)
+    np.testing.assert_array_equal(np.rint(255 * imread(tmp_path / "row.png")), row)

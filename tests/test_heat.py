@@ -142,9 +142,10 @@ def test_front_is_measured_and_walls_run_behind_it():
 
 
 @pytest.mark.parametrize(
-    ("step", "bridged", "num_pieces"), [(5.0, False, 1), (8.0, False, 2), (8.0, True, 1)]
+    ("step", "jump_pixels", "bridged", "num_pieces"),
+    [(5.0, 6.0, False, 1), (8.0, 6.0, False, 2), (8.0, 6.0, True, 1), (8.0, 9.0, False, 1)],
 )
-def test_front_is_cut_at_jumps(step: float, bridged: bool, num_pieces: int):
+def test_front_is_cut_at_jumps(step: float, jump_pixels: float, bridged: bool, num_pieces: int):
     """A wall before another one, seen straight on; the edge lies between the thinned columns."""
     camera = Camera(
         model=CameraModel.ORTHOGRAPHIC, width=60, height=60, fx=1.0, fy=1.0, cx=30.0, cy=30.0
@@ -160,7 +161,9 @@ def test_front_is_cut_at_jumps(step: float, bridged: bool, num_pieces: int):
         kind=flat.astype(np.uint8),
         outside=flat,
         is_rim=flat > 0,
+        is_reliable=flat == 0,
         pixel=1.0,
+        jump_pixels=jump_pixels,
     )
     front = thin_front(image, 450, bridged=bridged)
     assert len(np.unique(np.diff(np.unique(front.pixels[:, 1])))) == 1

@@ -35,6 +35,8 @@ from tests.model_folders import Made, crowd, good_result, small_scene, whole_fol
 from tests.results import a_pair, a_result, no_pair
 from tests.test_support import on_table, seen
 
+pytestmark = pytest.mark.slow
+
 
 def page_of(folder: Path) -> Page:
     return Page((folder / "report.html").read_text(encoding="utf-8"))

@@ -14,6 +14,8 @@ from scanweld.app.workspace import work_folder
 from scanweld.io import write_scan_ply
 from tests.scenes import creature_scene
 
+pytestmark = pytest.mark.slow
+
 NUM_KILLS = 5
 PROGRAM = """
 import os, signal, sys, threading, time

@@ -22,6 +22,8 @@ from scanweld.reconstruction import FactVerdict, Reconstruction, Verdict
 from scanweld.work.progress import Cache
 from tests.scenes import MILD_NOISE, Scene, scene_of, small_creature, view_of
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Config(
     prepare=PrepareConfig(num_samples=500),
     pairs=PairsConfig(keypoints="even", num_anchors=40, num_turns=18, num_survivors=(600, 60)),

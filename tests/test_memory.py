@@ -31,6 +31,8 @@ from scanweld.preparation.thinning import thinned
 from tests.prepared import moved
 from tests.scenes import creature_scene, random_motion
 
+pytestmark = pytest.mark.slow
+
 
 def a_scan(model: CameraModel = CameraModel.PINHOLE) -> RangeScan:
     return creature_scene(2, model=model).scans[0]

@@ -163,6 +163,7 @@ def test_diameter_and_centroids_of_a_scene():
         assert (world < scene.mesh.vertices.max(axis=0)).all()
 
 
+@pytest.mark.slow
 def test_surface_errors_of_concentric_balls():
     """Radii 50 and 51: every point is 1 away, and half the ball covers half of it."""
     inner, outer = sphere(50.0), sphere(51.0)

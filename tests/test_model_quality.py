@@ -27,6 +27,8 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_mesh, write_mesh_ply
 from scanweld.preparation import prepare
 
+pytestmark = pytest.mark.slow
+
 RADIUS = 50.0
 SIDES = [(0, 0), (90, 0), (180, 0), (270, 0), (0, 89), (0, -89)]
 PIXELS = 110.0

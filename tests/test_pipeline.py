@@ -29,6 +29,8 @@ from scanweld.work.progress import Cache
 from tests.prepared import scaled
 from tests.scenes import MILD_NOISE, Scene, creature_scene, primitive_scene
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Config(
     prepare=PrepareConfig(num_samples=500),
     heat=HeatConfig(num_modes=60, max_front_vertices=600),

@@ -21,6 +21,8 @@ from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinis
 from tests.command_line import scanweld as command
 from tests.scenes import creature_scene, scene_of
 
+pytestmark = pytest.mark.slow
+
 ESCAPE = "\x1b"
 Told = list[dict[str, object]]
 

@@ -18,6 +18,8 @@ from scanweld.work.progress import Cache
 from tests.scenes import MILD_NOISE, Scene, creature_scene, primitive_scene
 from tests.test_pipeline import CONFIG, Memory, assert_sound, errors_of
 
+pytestmark = pytest.mark.slow
+
 PAPER = CONFIG.model_copy(update={"method": "paper"})
 REPAIRED = PAPER.model_copy(update={"coarse": CoarseConfig(start="evidence", trim="auto")})
 

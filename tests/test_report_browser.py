@@ -21,6 +21,8 @@ from scanweld.app.html_report import write_html_report
 from scanweld.reconstruction import Verdict
 from tests.model_folders import crowd, good_result, small_scene, whole_folder, written
 
+pytestmark = pytest.mark.slow
+
 WAIT_SECONDS = 60.0
 FLAGS = (
     "--headless=new",

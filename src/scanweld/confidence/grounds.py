@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from scanweld.confidence.diagnostics import Fit
-from scanweld.confidence.joint_evidence import JointEvidence
+from scanweld.confidence.joint_evidence import MIN_CONDUCTANCE, JointEvidence
 from scanweld.evidence.evidence import Evidence
 from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
 
@@ -17,7 +17,7 @@ Grounds = Mapping[str, float]
 LEAST_SHARE = 1e-3
 LEAST_OBSERVABILITY = 1e-7
 MAX_MISFIT = 2.0
-MIN_CORROBORATION = 0.02
+MIN_CORROBORATION = MIN_CONDUCTANCE
 """Conductance between two scans below which other pairs do not hold them together."""
 
 

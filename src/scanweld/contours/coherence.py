@@ -24,15 +24,18 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 
 COHERENT_PIXELS = 2.0
-"""Contours that lie no farther apart in the image than this cohere."""
-NUM_DOUBTED = 20
-"""Contour points that would change a coherence by half."""
+"""Contours that lie no farther apart in the image than this are coherent."""
+NUM_ASSUMED = 20
+"""Contour points that are counted in with a coherence of one half: few points show little."""
 LAST_MATCH_PIXELS = 4.0
-"""Farthest contour match of a pose that is nearly right, in footprints of a pixel."""
-MIN_AGREEMENT = 0.5
-"""Cosine of the two surfaces' normals below which contours do not match."""
+"""Farthest contour match at a pose that is nearly right, in footprints of a pixel."""
+OUTLINE_NOISE_PIXELS = 0.3
+"""Standard deviation of an outline, in footprints: it is known to the pixel, no better."""
+MIN_OUTLINE_AGREEMENT = 0.5
+"""Cosine of the angle between two surfaces' normals below which their contours do not match."""
 MIN_SIDEWAYS = 0.5
-"""Length of a normal's part across the viewing ray below which it says little about a contour."""
+"""Sine of the angle between normal and viewing ray below which the surface is not seen edge-on, so
+that its contour is the border of a cut rather than an outline."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -74,7 +77,7 @@ def _visible(
     j_from_i: Pose,
     config: ContoursConfig,
 ) -> BoolArray:
-    """The third pruning in the reading that is asked for."""
+    """The third pruning, in the reading of eq. 6 that the settings name."""
     camera_i, camera_j = i.scan.image.camera, j.scan.image.camera
     match config.predicted_visibility:
         case "face":
@@ -94,7 +97,7 @@ def coherence(pairs: Sequence[ContourPair]) -> float:
 
 
 def _coherent(pairs: Sequence[ContourPair]) -> tuple[int, int]:
-    """How many predicted points cohere, and how many there are."""
+    """How many predicted points are coherent, and how many there are."""
     near = total = 0
     for pair in pairs:
         total += len(pair.predicted)
@@ -102,26 +105,6 @@ def _coherent(pairs: Sequence[ContourPair]) -> tuple[int, int]:
             distances, _ = KDTree(pair.observed.pixels).query(pair.predicted.pixels)
             near += int((distances <= COHERENT_PIXELS).sum())
     return near, total
-
-
-def contour_coherence(
-    scans: Sequence[PreparedScan], config: ContoursConfig
-) -> Callable[[int, int, Pose], float]:
-    """The coherence of scans i and j at a pose ``i_from_j``, of both contours in both views.
-
-    Few points say little: so many more, half of which cohere, are counted in.
-    """
-    observed = [observe_contours(scan, config) for scan in scans]
-
-    def cohere(i: int, j: int, i_from_j: Pose) -> float:
-        both = [
-            contour_pair(observed[i], observed[j], i_from_j.inverse(), config),
-            contour_pair(observed[j], observed[i], i_from_j, config),
-        ]
-        near, total = _coherent(both)
-        return (near + 0.5 * NUM_DOUBTED) / (total + NUM_DOUBTED)
-
-    return cohere
 
 
 def outline_matches(pair: ContourPair, camera_j: Camera, radius: float) -> Matches:
@@ -140,7 +123,7 @@ def outline_matches(pair: ContourPair, camera_j: Camera, radius: float) -> Match
     across = observed.normals - rays * np.einsum("nk,nk->n", rays, observed.normals)[:, None]
     length = np.linalg.norm(across, axis=1)
     agreement = np.einsum("nk,nk->n", observed.normals, pair.predicted.normals)
-    held = (distances <= radius) & (length > MIN_SIDEWAYS) & (agreement > MIN_AGREEMENT)
+    held = (distances <= radius) & (length > MIN_SIDEWAYS) & (agreement > MIN_OUTLINE_AGREEMENT)
     directions = across[held] / length[held, None]
     apart = pair.predicted.points[held] - observed.points[held]
     return Matches(
@@ -150,18 +133,45 @@ def outline_matches(pair: ContourPair, camera_j: Camera, radius: float) -> Match
     )
 
 
-def contour_matcher(
-    scans: Sequence[PreparedScan], config: ContoursConfig
-) -> Callable[[int, int, Pose], Matches]:
-    """What the joint refinement asks for contour terms: scans i, j and ``j_from_i`` to matches.
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class ContourMatcher:
+    """The observed contours of all scans of a run, compared pair by pair at any poses.
 
-    Each call renders scan i into camera j; the matches are in the sensor frame of j.
+    Attributes:
+        observed: The contours of each scan.
+        config: Which prunings are made, and how.
     """
-    observed = [observe_contours(scan, config) for scan in scans]
 
-    def match(i: int, j: int, j_from_i: Pose) -> Matches:
-        image = scans[j].image
-        pair = contour_pair(observed[i], observed[j], j_from_i, config)
+    observed: Sequence[ObservedContours]
+    config: ContoursConfig
+
+    def matches(self, i: int, j: int, j_from_i: Pose) -> Matches:
+        """Contour matches of scan i, rendered into camera j, on scan j; sensor frame of j."""
+        image = self.observed[j].scan.image
+        pair = contour_pair(self.observed[i], self.observed[j], j_from_i, self.config)
         return outline_matches(pair, image.camera, LAST_MATCH_PIXELS * image.pixel)
 
-    return match
+    def coherence(self, i: int, j: int, i_from_j: Pose) -> float:
+        """The coherence of the contours of scans i and j, each rendered into the other's camera.
+
+        A few points say little. So ``NUM_ASSUMED`` more are counted in, half of them coherent.
+        """
+        a, b = self.observed[i], self.observed[j]
+        both = [
+            contour_pair(a, b, i_from_j.inverse(), self.config),
+            contour_pair(b, a, i_from_j, self.config),
+        ]
+        near, total = _coherent(both)
+        return (near + 0.5 * NUM_ASSUMED) / (total + NUM_ASSUMED)
+
+
+def contour_matcher(scans: Sequence[PreparedScan], config: ContoursConfig) -> ContourMatcher:
+    """Find the contours of all scans once, for comparing them pair by pair."""
+    return ContourMatcher(observed=[observe_contours(s, config) for s in scans], config=config)
+
+
+def contour_coherence(
+    scans: Sequence[PreparedScan], config: ContoursConfig
+) -> Callable[[int, int, Pose], float]:
+    """``ContourMatcher.coherence`` of some scans."""
+    return contour_matcher(scans, config).coherence

@@ -8,9 +8,9 @@ that hide each other, folds, thin parts, no symmetry, and no two sides alike.
 from dataclasses import dataclass
 
 import numpy as np
-from skimage.measure import marching_cubes
 
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
+from scanweld.geometry.marching_cubes import isosurface
 from scanweld.geometry.mesh import TriangleMesh, compact, pieces
 
 Point = tuple[float, float, float]
@@ -127,8 +127,7 @@ _LIMBS = (
 )
 
 _TRUNK_LENGTH = 100.0
-_JOINT_SPREAD = 0.04
-_RADIUS_SPREAD = 0.12
+"""Length of the figure's trunk, in the unit of the mesh (say millimetres)."""
 
 
 def creature(seed: int = 0, *, voxels: int = 200) -> TriangleMesh:
@@ -149,26 +148,25 @@ def creature(seed: int = 0, *, voxels: int = 200) -> TriangleMesh:
     field += _wrinkles(axes)
     # A node exactly on the surface would give faces without area.
     field[np.abs(field) < 1e-3 * step] = 1e-3 * step
-    vertices, faces, _, _ = marching_cubes(field, 0.0, spacing=(step, step, step))
-    vertices, faces = _largest_body(vertices.astype(np.float64) + low, faces)
-    return TriangleMesh(
-        vertices=vertices * _TRUNK_LENGTH, faces=_outward(vertices, faces), colors=_coat(vertices)
-    )
+    nodes, faces = isosurface(field)
+    vertices, faces = _largest_body(low + step * nodes, faces)
+    return TriangleMesh(vertices=vertices * _TRUNK_LENGTH, faces=faces, colors=_coat(vertices))
 
 
 def _varied(limbs: tuple[Limb, ...], seed: int) -> tuple[Limb, ...]:
     """Other proportions and another stance; parts that meet move together."""
+    joint_spread, radius_spread = 0.1, 0.12
     rng = np.random.default_rng(seed)
     waves = rng.normal(size=(3, 3))
     phases = rng.uniform(0, 2 * np.pi, size=3)
 
     def moved(joint: Point) -> Point:
-        shift = 2.5 * _JOINT_SPREAD * np.sin(4.0 * (waves @ np.array(joint)) + phases)
+        shift = joint_spread * np.sin(4.0 * (waves @ np.array(joint)) + phases)
         x, y, z = np.array(joint) + shift
         return float(x), float(y), float(z)
 
     def scaled(radii: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(float(r * np.exp(_RADIUS_SPREAD * rng.normal())) for r in radii)
+        return tuple(float(r * np.exp(radius_spread * rng.normal())) for r in radii)
 
     return tuple(
         Limb(joints=tuple(map(moved, limb.joints)), radii=scaled(limb.radii), blend=limb.blend)
@@ -232,10 +230,3 @@ def _largest_body(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, In
     largest = np.argmax(np.bincount(body))
     vertices, faces, _ = compact(vertices, faces[body[faces[:, 0]] == largest])
     return vertices, faces
-
-
-def _outward(vertices: FloatArray, faces: IntArray) -> IntArray:
-    """Faces counter-clockwise from outside: the volume that they enclose is positive."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    volume = np.einsum("nk,nk->", a, np.cross(b, c))
-    return faces if volume > 0 else faces[:, ::-1]

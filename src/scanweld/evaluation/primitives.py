@@ -1,27 +1,34 @@
 """Plain objects that slide or turn upon themselves: what must not be put together wrongly."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
-import trimesh
+from scipy.spatial import ConvexHull
 
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.directions import golden_spiral
 from scanweld.geometry.mesh import TriangleMesh, compact
 
 
 def sphere(radius: float = 50.0) -> TriangleMesh:
     """A ball about the origin."""
-    return _converted(trimesh.creation.icosphere(subdivisions=5, radius=radius))
+    num_vertices = 10_000
+    heights = 1.0 - (2.0 * np.arange(num_vertices) + 1.0) / num_vertices
+    return _convex(radius * golden_spiral(heights))
 
 
 def box(x: float = 60.0, y: float = 80.0, z: float = 100.0) -> TriangleMesh:
     """A cuboid about the origin, with the given edges."""
-    return _converted(trimesh.creation.box(extents=(x, y, z)))
+    return _convex(0.5 * np.array(list(product((-x, x), (-y, y), (-z, z)))))
 
 
 def cylinder(radius: float = 30.0, height: float = 100.0) -> TriangleMesh:
     """A closed cylinder about the origin, along z."""
-    return _converted(trimesh.creation.cylinder(radius=radius, height=height, sections=256))
+    turn = 2 * np.pi * np.arange(256) / 256
+    x, y = radius * np.cos(turn), radius * np.sin(turn)
+    ends = [np.column_stack([x, y, np.full(len(turn), z)]) for z in (-height / 2, height / 2)]
+    return _convex(np.concatenate(ends))
 
 
 def plate(x: float = 100.0, y: float = 80.0, thickness: float = 4.0) -> TriangleMesh:
@@ -55,5 +62,8 @@ def lathe(
     return TriangleMesh(vertices=vertices, faces=used)
 
 
-def _converted(mesh: trimesh.Trimesh) -> TriangleMesh:
-    return TriangleMesh(vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+def _convex(points: FloatArray) -> TriangleMesh:
+    """The convex hull of points (N, 3) around the origin, all of them on it."""
+    faces = ConvexHull(points).simplices.astype(np.int64)
+    outward = np.linalg.det(points[faces]) > 0
+    return TriangleMesh(vertices=points, faces=np.where(outward[:, None], faces, faces[:, ::-1]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from scanweld.errors import InputError, WriteError
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
-from scanweld.evaluation.views import Axis, View, view_of
+from scanweld.evaluation.views import View, view_of
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, random_rotation
@@ -20,9 +20,11 @@ TYPICAL_NOISE = NoiseModel(
 """About what a good structured-light scanner does: 0.1 mm on an object of 20 cm."""
 
 _RING_ELEVATIONS_DEG = (20.0, -10.0)
-_POLAR_ELEVATIONS_DEG = (65.0, -65.0)
-_MIN_SCANS_FOR_POLES = (8, 10)
+"""Elevations of the sensor on its way around the object, by turns."""
+_POLES = ((8, 65.0), (10, -65.0))
+"""Number of scans from which on one looks from near a pole, and its elevation in degrees."""
 _JITTER_DEG = 5.0
+"""Most that azimuths and elevations differ from the regular ones."""
 
 
 def simulate(
@@ -34,12 +36,12 @@ def simulate(
     pixels: float = 300.0,
     noise: NoiseModel = TYPICAL_NOISE,
     seed: int = 0,
-    up: Axis = "z",
 ) -> PoseSet:
     """Scan an object from all around and write the scans in unknown order, each in its own frame.
 
     Writes ``scan_01.ply``, ``scan_02.ply``, ..., numbered in a random order, with range grid and
     camera, and ``truth/poses.json``. Every scan has its own random frame, camera roll and noise.
+    The sensor goes around the z axis.
 
     Args:
         mesh: The object, faces counter-clockwise seen from outside.
@@ -50,7 +52,6 @@ def simulate(
         pixels: Pixels across the object's diameter.
         noise: What the sensor does to depth.
         seed: Of everything random.
-        up: The axis of the mesh that the scans go around.
 
     Returns:
         The true poses, world_from_scan; the world is the mesh's frame.
@@ -65,7 +66,7 @@ def simulate(
         raise InputError("the mesh has no faces to be scanned: give a surface")
     folder = _empty_folder(Path(out_dir))
     rng = np.random.default_rng(seed)
-    views = views_around(mesh, num_scans, rng, model=model, pixels=pixels, up=up)
+    views = views_around(mesh, num_scans, rng, model=model, pixels=pixels)
     reach = 2.0 * principal_diameter(mesh.vertices)
     truth: dict[str, Pose] = {}
     for number, k in enumerate(rng.permutation(num_scans), start=1):
@@ -93,16 +94,15 @@ def views_around(
     *,
     model: CameraModel = CameraModel.PINHOLE,
     pixels: float = 300.0,
-    up: Axis = "z",
 ) -> list[View]:
-    """Views in a ring, by turns from a little above and below, and from the poles if many."""
-    num_poles = sum(num_views >= n for n in _MIN_SCANS_FOR_POLES)
-    in_ring = num_views - num_poles
+    """Views around z, by turns from a little above and below; from near the poles if many."""
+    poles = [elevation for least, elevation in _POLES if num_views >= least]
+    in_ring = num_views - len(poles)
     places = [
         (360.0 * k / in_ring, _RING_ELEVATIONS_DEG[k % len(_RING_ELEVATIONS_DEG)])
         for k in range(in_ring)
     ]
-    places += [(rng.uniform(0, 360), elevation) for elevation in _POLAR_ELEVATIONS_DEG[:num_poles]]
+    places += [(rng.uniform(0, 360), elevation) for elevation in poles]
     views = []
     for azimuth, elevation in places:
         jitter = rng.uniform(-_JITTER_DEG, _JITTER_DEG, size=2)
@@ -115,7 +115,6 @@ def views_around(
                 roll,
                 pixels=pixels,
                 model=model,
-                up=up,
             )
         )
     return views

@@ -9,6 +9,7 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 
 _NUM_NEAREST = 6
+"""Triangles that a point is held against: those nearest to it by their samples."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -16,6 +16,7 @@ from scanweld.geometry.scan import principal_diameter
 Axis = Literal["x", "y", "z"]
 
 _MARGIN_PIXELS = 4
+"""Empty pixels around the object in a view's image."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -34,10 +35,9 @@ def view_of(
     *,
     pixels: float = 300.0,
     model: CameraModel = CameraModel.PINHOLE,
-    distance_diameters: float = 3.0,
     up: Axis = "z",
 ) -> View:
-    """A camera that looks at the middle of an object and has all of it in its image.
+    """A camera that looks at the middle of an object from three diameters away, all of it in view.
 
     Args:
         mesh: The object.
@@ -46,14 +46,37 @@ def view_of(
         roll_deg: Turn about the viewing axis; 0 keeps up at the top of the image.
         pixels: Pixels across the object's diameter, at the distance of its middle.
         model: Pinhole or orthographic.
-        distance_diameters: From the middle of the object to the sensor.
         up: The axis of the object's frame about which the azimuth turns.
+    """
+    axes = camera_axes(azimuth_deg, elevation_deg, roll_deg, up)
+    return view_along(mesh, axes, pixels=pixels, model=model)
+
+
+def view_along(
+    mesh: TriangleMesh,
+    axes: FloatArray,
+    *,
+    pixels: float = 300.0,
+    model: CameraModel = CameraModel.PINHOLE,
+    distance_diameters: float = 3.0,
+) -> View:
+    """A camera with given axes that looks at the middle of an object, with all of it in view.
+
+    Args:
+        mesh: The object.
+        axes: (3, 3), columns are the camera's x (right), y (down) and z (away) in the object's
+            frame.
+        pixels: Pixels across the object's diameter, at the distance of its middle.
+        model: Pinhole or orthographic.
+        distance_diameters: From the middle of the object to the sensor.
+
+    Raises:
+        ValueError: If the sensor would stand inside the object.
     """
     diameter = principal_diameter(mesh.vertices)
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     distance = distance_diameters * diameter
-    rotation = _looking_in(azimuth_deg, elevation_deg, roll_deg, up)
-    pose = Pose(rotation=rotation, translation=middle - distance * rotation[:, 2])
+    pose = Pose(rotation=axes, translation=middle - distance * axes[:, 2])
     focal = pixels / diameter * (distance if model is CameraModel.PINHOLE else 1.0)
     centred = Camera(model=model, width=1, height=1, fx=focal, fy=focal, cx=0.0, cy=0.0)
     seen, _ = centred.project(pose.inverse().apply(mesh.vertices))
@@ -119,8 +142,10 @@ def seen_share(mesh: TriangleMesh, i: View, j: View) -> float:
     return float(areas[seen].sum() / areas.sum())
 
 
-def _looking_in(azimuth_deg: float, elevation_deg: float, roll_deg: float, up: Axis) -> FloatArray:
-    """Camera axes (columns x right, y down, z away) in the object's frame."""
+def camera_axes(
+    azimuth_deg: float, elevation_deg: float, roll_deg: float, up: Axis = "z"
+) -> FloatArray:
+    """Axes (columns x right, y down, z away) of a camera in the object's frame; see ``view_of``."""
     azimuth, elevation, roll = np.radians([azimuth_deg, elevation_deg, roll_deg])
     flat = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     top = np.array([0.0, 0.0, 1.0])

@@ -16,12 +16,11 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind
 
-JUMP_PIXELS = 6.0
-"""A pixel lies on an edge if one beside it is deeper by more, in footprints, or no surface."""
-
 
 def with_wide_edges(field: ScanField, reach: float) -> ScanField:
     """The scan as if each pixel saw the nearest edge that lies within reach of it, sideways.
+
+    A pixel lies on an edge if one beside it is deeper by a depth jump, or no surface.
 
     Args:
         field: The scan.
@@ -33,7 +32,8 @@ def with_wide_edges(field: ScanField, reach: float) -> ScanField:
         return field
     footprint = _footprint(field, float(np.median(depth[is_surface])))
     solid = np.where(is_surface, depth, np.inf)
-    is_edge = is_surface & (ndimage.maximum_filter(solid, 3) > depth + JUMP_PIXELS * footprint)
+    jump = field.jump_pixels * footprint
+    is_edge = is_surface & (ndimage.maximum_filter(solid, 3) > depth + jump)
     radius = round(reach / footprint)
     offsets = np.arange(-radius, radius + 1)
     disk = np.add.outer(offsets**2, offsets**2) <= radius**2

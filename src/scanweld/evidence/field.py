@@ -22,6 +22,8 @@ class ScanField:
 
     Attributes:
         diameter: Diameter of the scan, in its unit.
+        jump_pixels: Depth step between neighbouring pixels, in footprints, above which they are on
+            different surfaces.
         camera: (5,) parameters of the range image's camera.
         raster: (H, W, 6) float32 depth, normal, outside, kind of each pixel.
         points: (N, 3) evenly spread samples, any prefix of which is evenly spread too.
@@ -33,6 +35,7 @@ class ScanField:
     """
 
     diameter: float
+    jump_pixels: float
     camera: FloatArray
     raster: NDArray[np.float32]
     points: FloatArray
@@ -49,6 +52,7 @@ def make_field(scan: PreparedScan) -> ScanField:
     surface, closest, origin = _closest_points(scan)
     return ScanField(
         diameter=scan.diameter,
+        jump_pixels=scan.image.jump_pixels,
         camera=scan.image.camera.parameters,
         raster=_raster(scan.image),
         points=np.array(samples.points),

@@ -12,8 +12,6 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind
 
-JUMP_PIXELS = 6.0
-"""Depths of four neighbouring pixels that differ by more, in footprints, make no surface."""
 MAX_FEATURE_AREA = 0.02
 """Of a mark and what it comes to lie on, in squared diameters."""
 FREE_MARGIN_PIXELS = 1
@@ -48,8 +46,8 @@ TwoWay = tuple[Seen, Seen]
 def see(i: ScanField, j: ScanField, i_from_j: Pose, diameter: float) -> TwoWay:
     """All pixels of both scans in what the other saw."""
     forward, backward = pose_rows([i_from_j, i_from_j.inverse()])
-    of_i = _seen(i.camera, i.raster, j.camera, j.raster, backward)
-    of_j = _seen(j.camera, j.raster, i.camera, i.raster, forward)
+    of_i = _seen(i.camera, i.raster, j.camera, j.raster, backward, j.jump_pixels)
+    of_j = _seen(j.camera, j.raster, i.camera, i.raster, forward, i.jump_pixels)
     return (
         Seen(
             behind=of_i[0],
@@ -86,6 +84,7 @@ def _seen(
     camera_to: FloatArray,
     raster_to: NDArray[np.float32],
     pose: FloatArray,
+    jump_pixels: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], BoolArray]:
     """What Seen says of the pixels (H, W) of one scan in another's raster; the pose is to_from."""
     height, width = raster_from.shape[0], raster_from.shape[1]
@@ -117,7 +116,7 @@ def _seen(
                     _facing(raster_from, r, c, pose, (x, y, z), is_pinhole) > MIN_FACING
                 )
                 continue
-            surface = _surface_at(raster_to, u, v, 1.0 / camera_to[1], is_pinhole)
+            surface = _surface_at(raster_to, u, v, 1.0 / camera_to[1], jump_pixels, is_pinhole)
             if np.isnan(surface):
                 continue
             p, q = int(v + 0.5), int(u + 0.5)
@@ -133,9 +132,17 @@ def _seen(
 
 @njit(cache=True, nogil=True)
 def _surface_at(
-    raster: NDArray[np.float32], u: float, v: float, pixel: float, is_pinhole: bool
+    raster: NDArray[np.float32],
+    u: float,
+    v: float,
+    pixel: float,
+    jump_pixels: float,
+    is_pinhole: bool,
 ) -> float:
-    """Depth between four pixels, each so wide at a depth of 1; NaN if they make no surface."""
+    """Depth between four pixels, each so wide at a depth of 1; NaN if they make no surface.
+
+    They make none if their depths differ by more than a depth jump, in footprints.
+    """
     q, p = int(u), int(v)
     low, high, depth = np.inf, -np.inf, 0.0
     for dp in range(2):
@@ -148,7 +155,7 @@ def _surface_at(
             along = v - p if dp == 1 else 1.0 - (v - p)
             depth += across * along * at
     footprint = pixel * low if is_pinhole else pixel
-    return depth if high - low <= JUMP_PIXELS * footprint else np.nan
+    return depth if high - low <= jump_pixels * footprint else np.nan
 
 
 @njit(cache=True, nogil=True)

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import KDTree
 
+from scanweld.fusion.noise import MIN_COMMON
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import sample_colors
 from scanweld.fusion.support import weights_at
@@ -18,12 +19,10 @@ _UNSEEN = 128.0
 """Grey of a mesh where scans have colours but none reaches it."""
 _NUM_COMPARED = 20_000
 """Vertices at which the scans' exposures are compared, about."""
-_MIN_COMMON = 50
-"""Vertices that a pair of scans must share to be compared."""
 _MIN_FAIR = 0.1
-"""So large a share of them must be neither too dark nor too bright."""
-_DARK, _BRIGHT = 12.0, 243.0
-"""Outside of these a sensor's response says little of its exposure."""
+"""Share of the vertices common to two scans that must be neither too dark nor too bright."""
+_CLIPPED = 12.0
+"""Values (0 to 255) nearer than this to black or white say little of a sensor's exposure."""
 _RIDGE = 1e-3
 """Share of a scan's comparisons that the wish to leave it as it is weighs."""
 
@@ -81,7 +80,7 @@ def exposure_gains(
             difference = logs[i][:, channel] - logs[j][:, channel]
             num_common = int((seen[i] & seen[j]).sum())
             difference = difference[np.isfinite(difference)]
-            if len(difference) < max(_MIN_COMMON, _MIN_FAIR * num_common):
+            if len(difference) < max(MIN_COMMON, _MIN_FAIR * num_common):
                 continue
             n = float(len(difference))
             pair = np.ix_([i, j], [i, j])
@@ -98,7 +97,7 @@ def exposure_gains(
 
 def _log_colors(color: FloatArray, share: SingleArray) -> FloatArray:
     """Logarithms (V, 3) of colours, NaN where a scan says nothing of them."""
-    fair = (share > 0)[:, None] & (color > _DARK) & (color < _BRIGHT)
+    fair = (share > 0)[:, None] & (color > _CLIPPED) & (color < 255.0 - _CLIPPED)
     return np.log(color, out=np.full(color.shape, np.nan), where=fair)
 
 

@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from scanweld.config import Component
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import (
+    MIN_PIECE_SHARE,
     border_edges,
     border_vertices,
     compact,
@@ -21,10 +22,9 @@ from scanweld.geometry.mesh import (
 logger = logging.getLogger(__name__)
 
 _MIN_PIECE_VOXELS = 50.0
-_MIN_PIECE_SHARE = 2e-3
-"""Pieces with less area than so many squared voxels, or this share of all area, are dropped."""
-_SHRINK, _GROW = 0.5, -0.53
-"""Taubin's two steps: a smoothing one, and one that undoes the shrinking of the whole."""
+"""Pieces with less area than so many squared voxels are dropped, too."""
+_TAUBIN_STEPS = (0.5, -0.53)
+"""Taubin's factors lambda and mu: a smoothing step, and one that undoes the shrinking."""
 
 
 def chosen_pieces(
@@ -45,7 +45,7 @@ def chosen_pieces(
     face_area = 0.5 * np.linalg.norm(face_normals(vertices, faces), axis=1)
     face_area *= ~filled[faces].all(axis=1)
     area = np.bincount(piece, weights=face_area)
-    least = max(_MIN_PIECE_VOXELS * voxel**2, _MIN_PIECE_SHARE * float(area.sum()))
+    least = max(_MIN_PIECE_VOXELS * voxel**2, MIN_PIECE_SHARE * float(area.sum()))
     stays = np.arange(len(area)) == np.argmax(area)
     if component == "all":
         stays |= area >= least
@@ -109,8 +109,8 @@ def smoothed(
     links = ((links + links.T) > 0).astype(np.float64)
     degree = np.maximum(links.sum(axis=1), 1.0)
     mean = diags_array(1.0 / degree) @ links
-    second = _GROW if membrane is None else _SHRINK
-    for step in (_SHRINK, second) * rounds:
+    shrink, grow = _TAUBIN_STEPS
+    for step in (shrink, grow if membrane is None else shrink) * rounds:
         vertices = vertices + step * moves[:, None] * (mean @ vertices - vertices)
     return vertices
 

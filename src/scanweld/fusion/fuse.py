@@ -19,7 +19,7 @@ from scanweld.fusion.finish import (
 from scanweld.fusion.holes import closed_field
 from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
-from scanweld.fusion.sheets import without_second_sheets
+from scanweld.fusion.sheets import NORMAL_ROUNDS, without_second_sheets
 from scanweld.fusion.support import measure_support
 from scanweld.fusion.surface import extract_surface, vertex_flags
 from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
@@ -40,8 +40,6 @@ _PINHOLE_VOXELS = 12.0
 """Holes with so short a border come from single cells, whose corners no scan measured all."""
 _FILLED_ROUNDS = 20
 """Smoothing of what closes holes: the space that was seen empty has steps."""
-_NORMAL_ROUNDS = 1
-"""Slivers among the triangles would turn the normals of their corners."""
 
 
 def fuse(
@@ -166,7 +164,7 @@ def _seen_part(
     vertices: FloatArray, faces: IntArray, images: Sequence[PosedImage], voxel: float
 ) -> tuple[FloatArray, IntArray]:
     """What was seen of the surface, without what lies between and beyond, as a manifold."""
-    normals = smoothed_normals(vertices, faces, _NORMAL_ROUNDS)
+    normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
     support = measure_support(images, vertices, normals, voxel)
     faces = faces[(support.count > 0)[faces].all(axis=1)]
     return without_second_sheets(vertices, faces, support, voxel)
@@ -180,7 +178,7 @@ def _dressed(
     voxel: float,
 ) -> TriangleMesh:
     """The mesh with what is known of each vertex."""
-    normals = smoothed_normals(vertices, faces, _NORMAL_ROUNDS)
+    normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
     support = measure_support(images, vertices, normals, voxel)
     filled = filled | (support.count == 0)
     return TriangleMesh(

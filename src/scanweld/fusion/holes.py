@@ -19,6 +19,7 @@ from scipy.ndimage import map_coordinates
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.volume import (
     BLOCK,
+    DEPTH_VOXELS,
     MIN_EMPTY,
     Volume,
     add_images,
@@ -36,13 +37,15 @@ Closing = Literal["fill", "carve"]
 _COARSE_ACROSS = 128
 """Nodes of the coarse grid along the longest side of the surface, at most."""
 _MIN_COARSE_VOXELS = 4.0
+"""Least spacing of the coarse nodes, in voxels."""
 _COARSE_MARGIN = 3
 """Nodes around the surface; the outermost are outside of everything."""
-_COARSE_TRUNCATION = 1.5
-"""In coarse nodes; thinner parts of an object are the fine field's business."""
 _COARSE_SWEEPS = 300
+"""Sweeps of the relaxation over the coarse grid, which has far to go,"""
 _FINE_SWEEPS = 40
+"""and over the blocks of voxels, which begin with the coarse solution."""
 _OVER_RELAXATION = 1.8
+"""Factor of successive over-relaxation; below 2, or it does not converge."""
 _MAX_ROUNDS = 3
 """Rounds of relaxing and following the surface into new blocks; the last one only follows."""
 
@@ -79,7 +82,7 @@ class _Coarse:
         """Distances (P,) at points (P, 3), as a length, trilinear."""
         where = ((points - self.origin) / self.spacing).T
         scaled = map_coordinates(self.values, where, order=1, mode="nearest")
-        return scaled * _COARSE_TRUNCATION * self.spacing
+        return scaled * DEPTH_VOXELS * self.spacing
 
 
 def closed_field(
@@ -123,8 +126,10 @@ def _coarse_field(
     origin = low - _COARSE_MARGIN * spacing
     shape = np.ceil((extent / spacing + 2 * _COARSE_MARGIN + 1) / BLOCK).astype(np.int64)
     blocks = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3)
-    coarse = empty_volume(origin, spacing, _COARSE_TRUNCATION * spacing, blocks)
-    add_images(coarse, images, _COARSE_TRUNCATION * spacing, workers)
+    # Cut off where weights end: thinner parts of an object are the fine field's business.
+    truncation = DEPTH_VOXELS * spacing
+    coarse = empty_volume(origin, spacing, truncation, blocks)
+    add_images(coarse, images, truncation, workers)
     values, is_unknown = _labelled(coarse)
     values, is_unknown = _dense(values, shape), _dense(is_unknown, shape)
     for axis in range(3):

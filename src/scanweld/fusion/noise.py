@@ -11,23 +11,25 @@ from scipy.optimize import nnls
 from scanweld.fusion.posed_image import PosedImage
 from scanweld.fusion.sampling import sample_surface
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 
 logger = logging.getLogger(__name__)
 
 _NUM_POINTS = 1500
 """Points of a scan that are held against the others, about."""
-_MIN_COMMON = 50
-"""Points that a pair of scans must have in common to have a say."""
+MIN_COMMON = 50
+"""Points that two scans must have in common to be compared."""
 _REACH_PIXELS = 4.0
-"""Points farther from the other surface are not on it."""
+"""Points farther than this from another scan's surface are not on it."""
 _MIN_COSINE = 0.5
-"""Nor are those whose normals differ by more than this."""
+"""Nor are points that the other scan's sensor would see more obliquely than this (cosine)."""
 _FLOOR_PIXELS = 0.02
-"""Noise is never less: normals and interpolation are no better."""
+"""Least noise, in footprints of a pixel: normals and interpolation are no better."""
 _RIDGE = 0.02
-"""Weight of the wish that scans are alike, where pairs do not tell them apart."""
+"""Weight of the assumption that all scans have the same noise, beside a pair of scans: it decides
+where pairs do not."""
 _MAX_PRECISION = 4.0
-_MAD_TO_SIGMA = 1.4826
+"""Most that a scan counts for, and least if inverted, beside the median scan."""
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)
 """Steps of a sequence that fills the unit square evenly (Roberts 2018)."""
 
@@ -61,7 +63,7 @@ def scan_noise(images: Sequence[PosedImage]) -> FloatArray:
     rows, variances, counts = [], [], []
     for i, j in permutations(range(len(images)), 2):
         spread, count = _spread(points[i], images[j])
-        if count >= _MIN_COMMON:
+        if count >= MIN_COMMON:
             row = np.zeros(len(images))
             row[[i, j]] = 1.0
             rows.append(row)
@@ -108,7 +110,7 @@ def _spread(points: tuple[FloatArray, FloatArray], image: PosedImage) -> tuple[f
     near = (weight > 0) & faces_sensor & (np.abs(distance) < _REACH_PIXELS * image.pixel)
     if not near.any():
         return 0.0, 0
-    return _MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), int(near.sum())
+    return MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), int(near.sum())
 
 
 def _towards(image: PosedImage, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -129,4 +131,4 @@ def _own_noise(image: PosedImage) -> float:
     if not len(known):
         return 0.0
     # A pixel against the mean of four has 5/4 of its variance, a point between pixels 4/9.
-    return _MAD_TO_SIGMA * float(np.median(known)) * np.sqrt(4 / 9 * 4 / 5)
+    return MAD_TO_SIGMA * float(np.median(known)) * np.sqrt(4 / 9 * 4 / 5)

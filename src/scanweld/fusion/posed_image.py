@@ -12,9 +12,14 @@ from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.prepared import PixelKind, PreparedScan
+from scanweld.geometry.prepared import MIN_COSINE, PixelKind, PreparedScan
 from scanweld.preparation.prepare import surface_points
-from scanweld.preparation.range_image import normals_image, render_surface, rim_pixels
+from scanweld.preparation.range_image import (
+    incidence_cosines,
+    normals_image,
+    render_surface,
+    rim_pixels,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -30,9 +35,8 @@ _MAX_LOST = 0.02
 """An image on whose free pixels lies this share of another scan's surface does not carve there."""
 _NUM_TRUST_POINTS = 2000
 """Points of a scan by which the others' free pixels are judged, about."""
-_MIN_COSINE = 0.1
-"""Pixels seen more obliquely than this have no say."""
 _MARGIN_PIXELS = 2.0
+"""Space around the surface that the image holds."""
 _MAX_NOISE_PIXELS = 0.5
 """Noisier depth is smoothed in each scan; else the mean of the scans blurs less."""
 
@@ -158,9 +162,8 @@ def _weights(
     camera: Camera, depth: FloatArray, normals: FloatArray, is_rim: BoolArray
 ) -> SingleArray:
     """(H, W) cosine of incidence times a ramp that rises from the rim; 0 off the surface."""
-    rays = camera.view_directions(camera.unproject_image(depth))
-    cosine = -np.einsum("hwk,hwk->hw", normals, rays)
-    is_surface = np.isfinite(depth) & (cosine > _MIN_COSINE)
+    cosine = incidence_cosines(camera, depth, normals)
+    is_surface = np.isfinite(depth) & (cosine > MIN_COSINE)
     inner = np.pad(is_surface & ~is_rim, 1)
     inward = np.asarray(distance_transform_edt(inner))[1:-1, 1:-1]
     ramp = _RIM_WEIGHT + (1 - _RIM_WEIGHT) * np.minimum(inward / _RAMP_PIXELS, 1.0)

@@ -11,7 +11,7 @@ from scanweld.geometry.mesh import smoothed_normals
 
 _SAME_SIDE = 0.7
 """Cosine above which two sheets look the same way; the sides of a thin wall look apart."""
-_MIN_VOXELS, _MAX_VOXELS = 0.75, 3.0
+_APART_VOXELS = (0.75, 3.0)
 """How far along the normal the other sheet lies, at least and at most."""
 _MAX_EDGES = 5
 """Vertices that are no more edges apart are on one sheet."""
@@ -19,8 +19,8 @@ _RADIUS_VOXELS = 0.75
 """Places on the normal are so far from a vertex of the other sheet, at most."""
 _MAX_PEELS = 8
 """Rounds in which second sheets are taken off; two or three do."""
-_NORMAL_ROUNDS = 1
-"""Slivers among the triangles would turn the normals of their corners."""
+NORMAL_ROUNDS = 1
+"""Rounds of averaging normals: thin triangles would tilt the normals of their corners."""
 
 
 def without_second_sheets(
@@ -48,7 +48,7 @@ def without_second_sheets(
         if not len(faces):
             break
         points = vertices[index]
-        normals = smoothed_normals(points, faces, _NORMAL_ROUNDS)
+        normals = smoothed_normals(points, faces, NORMAL_ROUNDS)
         other = second_sheets(points, faces, normals, voxel)
         one = np.flatnonzero(other >= 0)
         if not len(one):
@@ -74,8 +74,9 @@ def second_sheets(
         voxel: Edge of a voxel.
     """
     tree = KDTree(vertices)
+    least, most = _APART_VOXELS
     other = np.full(len(vertices), -1)
-    for step in np.arange(_MIN_VOXELS + 0.5, _MAX_VOXELS, _RADIUS_VOXELS):
+    for step in np.arange(least + 0.5, most, _RADIUS_VOXELS):
         for side in (1.0, -1.0):
             places = vertices + side * step * voxel * normals
             apart, nearest = tree.query(places, distance_upper_bound=_RADIUS_VOXELS * voxel)
@@ -84,7 +85,7 @@ def second_sheets(
             between = vertices[index] - vertices[found]
             offset = np.abs(np.einsum("vk,vk->v", between, normals[found]))
             alike = np.einsum("vk,vk->v", normals[index], normals[found]) > _SAME_SIDE
-            is_sheet = alike & (offset > _MIN_VOXELS * voxel)
+            is_sheet = alike & (offset > least * voxel)
             other[found[is_sheet]] = index[is_sheet]
     one = np.flatnonzero(other >= 0)
     other[one[_hang_together(one, other[one], faces, len(vertices))]] = -1

@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 from scanweld.fusion.posed_image import PosedImage
 from scanweld.fusion.sampling import sample_surface
 from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS
+from scanweld.geometry.prepared import MIN_COSINE
 
-_MIN_COSINE = 0.1
-"""A scan does not speak for a vertex that looks away from it, or nearly so."""
-_REACH_VOXELS = 1.0
-_REACH_SIGMAS = 4.0
-"""Nor for one farther from its surface than both of these."""
 _PRIOR_SCANS = 4.0
 """The noise of the scans as a whole counts for as many scans as these; the local scatter besides.
 
@@ -52,7 +49,7 @@ def measure_support(
     count, total, squares, scatter = (np.zeros(size) for _ in range(4))
     for image in images:
         distance, weight = weights_at(image, vertices, normals)
-        reach = max(_REACH_VOXELS * voxel, _REACH_SIGMAS * image.noise)
+        reach = max(voxel, SIGNIFICANT_SIGMAS * image.noise)
         supports = (weight > 0) & (np.abs(distance) < reach)
         w = np.where(supports, image.precision * weight, 0.0)
         count += supports
@@ -73,4 +70,4 @@ def weights_at(
     distance, weight = sample_surface(image, vertices)
     rays = image.camera.view_directions(image.sensor_from_world.apply(vertices))
     cosine = -np.einsum("vk,vk->v", image.sensor_from_world.turn(normals), rays)
-    return distance, np.where(cosine > _MIN_COSINE, weight, np.float32(0))
+    return distance, np.where(cosine > MIN_COSINE, weight, np.float32(0))

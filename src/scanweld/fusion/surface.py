@@ -2,13 +2,11 @@
 
 import numpy as np
 
-from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
 from scanweld.fusion.posed_image import SingleArray
-from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume
+from scanweld.fusion.volume import BLOCK, CHUNK, Volume, block_keys, blocks_of
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.marching_cubes import corner_offsets, crossed_edges
 
-_CHUNK = 4096
-"""Blocks that are looked at together; bounds the memory."""
 _MIN_STEP = 0.02
 """Vertices keep this share of a voxel's edge away from its ends: no triangle shrinks to nothing."""
 
@@ -30,8 +28,8 @@ def extract_surface(
     found: list[tuple[IntArray, FloatArray]] = []
     corners: list[IntArray] = []
     num_found = 0
-    for start in range(0, len(volume.blocks), _CHUNK):
-        index = np.arange(start, min(start + _CHUNK, len(volume.blocks)))
+    for start in range(0, len(volume.blocks), CHUNK):
+        index = np.arange(start, min(start + CHUNK, len(volume.blocks)))
         keys, ends = _cell_edges(volume, distance, index)
         keys, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
         found.append((keys, ends[first]))
@@ -54,20 +52,14 @@ def _cell_edges(
         Keys (3 T,) of edges and values (3 T, 2).
     """
     padded = _with_neighbours(volume, distance, index)
-    offsets = corner_offsets()
-    corners = np.stack([padded[:, i:, j:, k:][:, :BLOCK, :BLOCK, :BLOCK] for i, j, k in offsets])
-    case = np.packbits(corners < 0, axis=0, bitorder="little")[0]
-    is_crossed = (case > 0) & (case < 255) & np.isfinite(corners).all(axis=0)
+    shifted = [padded[:, i:, j:, k:][:, :BLOCK, :BLOCK, :BLOCK] for i, j, k in corner_offsets()]
+    corners = np.stack(shifted)
+    inside = corners < 0
+    is_crossed = inside.any(axis=0) & ~inside.all(axis=0) & np.isfinite(corners).all(axis=0)
     cell = np.argwhere(is_crossed)
-    edges = triangle_table().reshape(256, -1)[case[is_crossed]]
-    row, column = np.nonzero(edges >= 0)
-    edge = edges[row, column]
-    ends = edge_corners()[edge]
-    block, voxel = volume.blocks[index[cell[:, 0]]], cell[:, 1:]
-    base = (BLOCK * block + voxel)[row] + offsets[ends[:, 0]]
-    keys = (base[:, 0] << KEY_BITS | base[:, 1]) << KEY_BITS | base[:, 2]
-    values = corners[:, is_crossed].T
-    return 3 * keys + edge // 4, values[row[:, None], ends].astype(np.float64)
+    cells = BLOCK * volume.blocks[index[cell[:, 0]]] + cell[:, 1:]
+    nodes, axis, ends = crossed_edges(cells, corners[:, is_crossed].T)
+    return 3 * block_keys(nodes) + axis, ends.astype(np.float64)
 
 
 def _with_neighbours(volume: Volume, distance: SingleArray, index: IntArray) -> SingleArray:
@@ -84,9 +76,7 @@ def _with_neighbours(volume: Volume, distance: SingleArray, index: IntArray) -> 
 
 def _vertices(volume: Volume, keys: IntArray, values: FloatArray) -> FloatArray:
     """Where the distance is zero on edges, by linear interpolation."""
-    axis, corner = keys % 3, keys // 3
-    mask = (1 << KEY_BITS) - 1
-    base = np.stack([corner >> 2 * KEY_BITS, corner >> KEY_BITS & mask, corner & mask], axis=1)
+    axis, base = keys % 3, blocks_of(keys // 3)
     step = np.clip(values[:, 0] / (values[:, 0] - values[:, 1]), _MIN_STEP, 1 - _MIN_STEP)
     return volume.origin + volume.voxel * (base + step[:, None] * np.eye(3)[axis])
 

@@ -14,28 +14,27 @@ from scanweld.errors import InputError
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import plane_distance, project, smooth_distance
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.grid import GAP_ROUNDS
 from scanweld.work.threads import map_in_order
 
 BLOCK = 8
 """Voxels along the edge of a block."""
-KEY_BITS = 20
+_KEY_BITS = 20
 """Voxel and block coordinates are below 2^20, so that three of them fit into one number."""
-_CARVE_RATIO = 1.0
-"""A voxel is empty where free space weighs more than this share of its surface's weight."""
 _MARGIN_BLOCKS = 8
 """Coordinates that stay free below the lowest block: holes may be closed there."""
 DEPTH_VOXELS = 1.5
+"""Weights fall to nothing this far behind a surface, where the other side of a wall may be,"""
 DEPTH_SIGMAS = 3.0
-"""Weights fall to nothing this far behind a surface, where the other side of a wall may be."""
-_PINHOLE_ROUNDS = 2
+"""or so many standard deviations of the noise, if that is more."""
 _MIN_DEEP_VOXELS = 0.7
 """Voxels so far behind the surface are deep inside."""
 MIN_EMPTY = 0.3
 """Sum of the weights of rays that tells that a voxel without a surface is empty."""
 _MAX_STEP_VOXELS = 2.5
 """Distances two voxels apart that differ by more are not of one surface."""
-_CHUNK = 512
-"""Blocks that a worker takes at a time."""
+CHUNK = 512
+"""Blocks that are worked on together: bounds the memory, and is a worker's share."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -70,12 +69,12 @@ class Volume:
         right behind one that is deep inside are inside too, and single ones between measured ones
         are filled: they would be pinholes in the surface.
         """
-        is_solid = self.empty <= _CARVE_RATIO * self.weight
+        is_solid = self.empty <= self.weight
         is_seen = (self.weight > 0) & ((self.distance >= 0) | is_solid)
         mean = np.full(self.weight.shape, np.nan, np.float32)
         np.divide(self.distance, self.weight, out=mean, where=is_seen)
         nearby = self.neighbours()
-        for _ in range(_PINHOLE_ROUNDS):
+        for _ in range(GAP_ROUNDS):
             filled = mean.copy()
             _fill_pinholes(mean, self.empty, nearby, self.voxel / self.truncation, filled)
             mean = filled
@@ -124,7 +123,7 @@ def add_images(
     """Add images to the volume's sums, as ``integrate`` does."""
 
     def work(start: int) -> None:
-        part = slice(start, start + _CHUNK)
+        part = slice(start, start + CHUNK)
         for image in images:
             _integrate_image(
                 volume.distance[part],
@@ -144,7 +143,7 @@ def add_images(
                 image.trust,
             )
 
-    for _ in map_in_order(work, range(0, len(volume.blocks), _CHUNK), workers):
+    for _ in map_in_order(work, range(0, len(volume.blocks), CHUNK), workers):
         pass
 
 
@@ -183,20 +182,20 @@ def merged(first: Volume, second: Volume) -> tuple[Volume, IntArray]:
 def block_keys(blocks: IntArray) -> IntArray:
     """One number (N,) for the coordinates (N, 3) of each block."""
     x, y, z = blocks[..., 0], blocks[..., 1], blocks[..., 2]
-    return (((x << KEY_BITS) | y) << KEY_BITS) | z
+    return (((x << _KEY_BITS) | y) << _KEY_BITS) | z
 
 
 def blocks_of(keys: IntArray) -> IntArray:
     """Coordinates (N, 3) of the blocks with these keys (N,)."""
-    mask = (1 << KEY_BITS) - 1
-    return np.stack([keys >> (2 * KEY_BITS), (keys >> KEY_BITS) & mask, keys & mask], axis=-1)
+    mask = (1 << _KEY_BITS) - 1
+    return np.stack([keys >> (2 * _KEY_BITS), (keys >> _KEY_BITS) & mask, keys & mask], axis=-1)
 
 
 def _allocate(images: Sequence[PosedImage], voxel: float, truncation: float) -> Volume:
     bounds = [(p.min(axis=0), p.max(axis=0)) for p in (i.points() for i in images) if len(p)]
     low = np.min([low for low, _ in bounds], axis=0)
     high = np.max([high for _, high in bounds], axis=0)
-    if float((high - low).max()) / voxel > 0.9 * 2**KEY_BITS:
+    if float((high - low).max()) / voxel > 0.9 * 2**_KEY_BITS:
         raise InputError("the posed scans lie too far apart to be fused; see their poses")
     origin = low - truncation - (1 + _MARGIN_BLOCKS * BLOCK) * voxel
     keys = np.zeros(0, np.int64)

@@ -1,7 +1,7 @@
 """The parts of a robust Gauss-Newton step on a pose that all refinements share.
 
-A step is a twist (6,): a turn about a centre, times an arm, then a shift. With an arm of about the
-object's size both parts are lengths, so that they compare and one damping fits both.
+A step is a twist (6,): a rotation about a centre in radians, times the lever arm, then a
+translation. Both parts are then lengths, so that they compare and one damping fits both.
 """
 
 import numpy as np
@@ -15,6 +15,16 @@ MAD_TO_SIGMA = 1.4826
 """Standard deviation of normally distributed residuals over their median magnitude."""
 DAMPING = 1e-6
 """Added to the diagonal, relative to its mean: what no match holds stays where it is."""
+SIGNIFICANT_SIGMAS = 4.0
+"""Standard deviations beyond which a difference is taken for real, not for noise (1 in 16,000)."""
+TURN_SCALE = 3.0
+"""A rotation in radians counts like a translation by the diameter over this, so that the two
+compare: the points of a surface lie about a third of its diameter from its centre."""
+
+
+def lever_arm(diameter: float) -> float:
+    """The length that turns a rotation (radians) of an object of a diameter into a movement."""
+    return diameter / TURN_SCALE
 
 
 def jacobian(

@@ -4,6 +4,10 @@ import numpy as np
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
+GAP_ROUNDS = 2
+"""Gaps between measured cells (pixels or voxels) are lost returns, up to this many cells from the
+nearest measured one: they are filled from their neighbours in so many rounds."""
+
 
 def grid_faces(
     grid: IntArray, points: FloatArray, depth: FloatArray, max_step: float, max_edge: float

@@ -6,6 +6,9 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, frozen
 
+MIN_AGREEMENT = 0.8
+"""Cosine of the angle between the normals of two matched points below which they do not match."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Matches:

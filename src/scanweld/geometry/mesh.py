@@ -8,6 +8,9 @@ from scipy.sparse.csgraph import connected_components
 
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
 
+MIN_PIECE_SHARE = 0.002
+"""Connected pieces that are smaller than this share of a surface are taken for noise."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class TriangleMesh:

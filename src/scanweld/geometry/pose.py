@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 
 from scanweld.geometry.arrays import FloatArray, frozen
 
-_IDENTITY = np.eye(3)
-
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Pose:
@@ -157,10 +155,10 @@ def random_rotation(rng: np.random.Generator) -> FloatArray:
 
 
 def _is_rotation(matrix: FloatArray) -> bool:
-    # Written out: poses are made by the ten thousand while components grow.
+    # The determinant is written out: poses are made by the ten thousand while components grow.
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     det = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    return det > 0 and float(np.abs(matrix @ matrix.T - _IDENTITY).max()) < 1e-6
+    return det > 0 and float(np.abs(matrix @ matrix.T - np.eye(3)).max()) < 1e-6
 
 
 def _straightened(matrix: FloatArray) -> FloatArray:

@@ -11,6 +11,9 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 
+MIN_COSINE = 0.1
+"""Cosine of incidence below which a sensor measures too poorly for its pixels to count."""
+
 
 class PixelKind(IntEnum):
     """What a pixel's ray says: it hit a surface, went past the object, or nothing is known."""
@@ -32,7 +35,11 @@ class RangeImage:
         outside: (H, W) distance of a free pixel from the closed silhouette, as a length on the
             object; 0 inside the silhouette.
         is_rim: (H, W) surface pixels at a depth jump, a hole or the silhouette, and next to them.
+        is_reliable: (H, W) surface pixels off the rim and not seen at grazing incidence: where a
+            normal can be trusted.
         pixel: Footprint of a pixel on the object, in the scans' unit.
+        jump_pixels: Depth step between neighbouring pixels, in footprints, above which they are on
+            different surfaces.
     """
 
     camera: Camera
@@ -41,7 +48,9 @@ class RangeImage:
     kind: ByteArray
     outside: FloatArray
     is_rim: BoolArray
+    is_reliable: BoolArray
     pixel: float
+    jump_pixels: float
 
     def __post_init__(self) -> None:
         shape = (self.camera.height, self.camera.width)
@@ -51,6 +60,7 @@ class RangeImage:
         put("kind", frozen(self.kind, np.uint8, shape))
         put("outside", frozen(self.outside, np.float64, shape))
         put("is_rim", frozen(self.is_rim, np.bool_, shape))
+        put("is_reliable", frozen(self.is_reliable, np.bool_, shape))
 
     def points(self) -> FloatArray:
         """(H, W, 3) points in the sensor frame, NaN where there is no surface."""

@@ -14,12 +14,16 @@ from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.rasterize import render_depth
 
-_PAPER = np.array([255.0, 255.0, 255.0])
 _FRONT = np.array([205.0, 205.0, 200.0])
+"""Red, green and blue (0 to 255) of a face seen from outside,"""
 _BACK = np.array([120.0, 140.0, 190.0])
+"""and of one seen from inside."""
 _AMBIENT = 0.15
+"""Brightness of a face seen edge-on, as a share of one that faces the viewer."""
 _MARGIN = 0.03
+"""Space around the object, as a share of its size in the picture."""
 _OVERSAMPLING = 2
+"""Pixels rendered along the edge of each pixel of the picture, against jagged outlines."""
 
 
 def render_shaded(
@@ -73,7 +77,7 @@ def _render(
     camera = _camera_around(points[np.unique(mesh.faces)], size * _OVERSAMPLING)
     depth, face_of = render_depth(points, mesh.faces, camera)
     seen = face_of >= 0
-    picture = np.broadcast_to(_PAPER, (*depth.shape, 3)).copy()
+    picture = np.full((*depth.shape, 3), 255.0)
     faces = mesh.faces[face_of[seen]]
     shares = barycentric(points[faces], camera.unproject_image(depth)[seen])
     flat = face_normals(points, faces)

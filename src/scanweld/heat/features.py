@@ -18,8 +18,6 @@ from scanweld.heat.surface import heat_surface
 
 _VERTICES_PER_MODE = 2
 """A front of fewer vertices than this many times the modes does not resolve them."""
-_MIN_COSINE = 0.15
-"""Keypoints need a normal to be trusted: farther from grazing incidence than this."""
 
 logger = logging.getLogger(__name__)
 
@@ -114,11 +112,7 @@ def move_off_rims(
     An anchor is a measured pixel away from rims and grazing incidence.
     """
     rows, columns = front.pixels.T
-    toward = -np.einsum(
-        "nk,nk->n", image.camera.view_directions(front.points), image.normals[rows, columns]
-    )
-    # Bridged dropouts have no normal: NaN compares false.
-    usable = np.flatnonzero(~image.is_rim[rows, columns] & (toward > _MIN_COSINE))
+    usable = np.flatnonzero(image.is_reliable[rows, columns])
     if len(usable) == 0 or len(at) == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(len(at), dtype=bool)
     distance, nearest = map(np.atleast_1d, KDTree(front.points[usable]).query(front.points[at]))

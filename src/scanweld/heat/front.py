@@ -8,15 +8,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
+from scanweld.geometry.grid import GAP_ROUNDS
 from scanweld.geometry.mesh import pieces
 from scanweld.geometry.prepared import RangeImage
 
-_JUMP_PIXELS = 6.0
-"""Depth step between neighbouring pixels, in footprints, that cuts the surface."""
 _SMALLEST_PIECE = 0.01
 """Pieces smaller than this share of the front's vertices tell nothing and cost modes."""
-_DROPOUT_PIXELS = 2
-"""A hole of so many pixels across is a dropout: the surface goes on beneath it."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -52,9 +49,10 @@ def thin_front(image: RangeImage, max_vertices: int, *, bridged: bool = False) -
     unless jumps are bridged, too. Dropouts of a pixel or two always are; small pieces are left out.
     The mesh may be empty.
     """
-    depth = _bridge_dropouts(image.depth, _JUMP_PIXELS * image.pixel)
+    max_step = image.jump_pixels * image.pixel
+    depth = _bridge_dropouts(image.depth, max_step)
     points = image.camera.unproject_image(depth)
-    jump = np.inf if bridged else _JUMP_PIXELS * image.pixel
+    jump = np.inf if bridged else max_step
     for stride in count(1):
         if np.isfinite(depth[::stride, ::stride]).sum() > max_vertices:
             continue
@@ -66,7 +64,7 @@ def thin_front(image: RangeImage, max_vertices: int, *, bridged: bool = False) -
 
 def _bridge_dropouts(depth: FloatArray, jump: float) -> FloatArray:
     """Depths with small holes filled from both sides of their row or column, where these agree."""
-    for _ in range(_DROPOUT_PIXELS):
+    for _ in range(GAP_ROUNDS):
         padded = np.pad(depth, 1, constant_values=np.nan)
         filled = depth.copy()
         for one, other in (

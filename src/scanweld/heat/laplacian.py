@@ -7,10 +7,6 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from scanweld.geometry.arrays import FloatArray, IntArray
 
-_SHIFT = 1.0
-"""Shift of the spectrum, for a mesh of unit size: makes the operator definite."""
-_START_SEED = 20
-
 
 def eigenpairs(
     vertices: FloatArray, faces: IntArray, num_modes: int, cold: IntArray | None = None
@@ -45,14 +41,16 @@ def eigenpairs(
 def _smallest(operator: csc_array, num_modes: int) -> tuple[FloatArray, FloatArray]:
     """Smallest eigenvalues (K,) and orthonormal vectors (N, K) of a symmetric operator (N, N)."""
     n = operator.diagonal().size
+    shift = 1.0  # of the spectrum, for a mesh of unit size: makes the operator definite
     factors = splu(
-        csc_array(operator + _SHIFT * eye_array(n)),
+        csc_array(operator + shift * eye_array(n)),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
     # scipy's stubs know only the base class's constructor.
     inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)  # pyright: ignore[reportCallIssue]
-    start = np.random.default_rng(_START_SEED).standard_normal(n)
-    values, vectors = eigsh(operator, k=num_modes, sigma=-_SHIFT, v0=start, OPinv=inverse)
+    # Any seed does, but it must be the same in every run.
+    start = np.random.default_rng(20).standard_normal(n)
+    values, vectors = eigsh(operator, k=num_modes, sigma=-shift, v0=start, OPinv=inverse)
     return np.maximum(values, 0.0), vectors

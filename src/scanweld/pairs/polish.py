@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from scanweld.config import RefineConfig
+from scanweld.contours.coherence import ContourMatcher
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import Alternative
-from scanweld.refinement.refine import ContourMatcher, refine_poses
+from scanweld.refinement.refine import refine_poses
 
 NUM_POLISHED = 2
 """Alternatives that are refined with all points and contours, at most."""

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scanweld.config import Config
+from scanweld.contours.coherence import ContourMatcher
 from scanweld.evidence.field import ScanField
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
@@ -14,7 +15,6 @@ from scanweld.pairs.polish import JointPolish
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairResult
-from scanweld.refinement.refine import ContourMatcher
 
 Edge = tuple[int, int]
 

@@ -7,6 +7,7 @@ import numpy as np
 from scanweld.evidence.evidence import VIOLATION_WEIGHT
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.icp import IcpSchedule, icp
+from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
 from scanweld.evidence.visibility import count_evidence, kernel_view
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose_tolerance import PoseTolerance
@@ -14,10 +15,8 @@ from scanweld.pairs.hypotheses import Anchors, search_weights, sweep
 from scanweld.pairs.problem import PairProblem, schedules, to_pose
 from scanweld.pairs.result import Alternative
 
-SAME_HYPOTHESIS_DEG = 8.0
-"""Hypotheses that differ by less than this,"""
-SAME_HYPOTHESIS_DIAMETERS = 0.04
-"""and put the middle of j to within this of each other, come to the same."""
+HYPOTHESIS_SHARE = 2.0 / 3.0
+"""Hypotheses come to the same if they differ by less than this share of what makes rivals."""
 MAX_SWEPT = 4000
 """Hypotheses of each set of anchors that are kept at all."""
 NUM_RIVALS = 24
@@ -47,8 +46,10 @@ def search(problem: PairProblem, anchors: Sequence[tuple[Anchors, Anchors]]) -> 
 
 def same_hypothesis(diameter: float) -> PoseTolerance:
     """Hypotheses that differ by less come to the same."""
-    shift = SAME_HYPOTHESIS_DIAMETERS * diameter
-    return PoseTolerance(angle_deg=SAME_HYPOTHESIS_DEG, shift=shift)
+    return PoseTolerance(
+        angle_deg=HYPOTHESIS_SHARE * RIVAL_ANGLE_DEG,
+        shift=HYPOTHESIS_SHARE * RIVAL_SHIFT_DIAMETERS * diameter,
+    )
 
 
 def score_poses(

@@ -11,13 +11,14 @@ import numpy as np
 
 from scanweld.evidence.icp import MIN_MATCHES
 from scanweld.evidence.information import TURN_SCALE
+from scanweld.evidence.rivals import RIVAL_SHIFT_DIAMETERS
 from scanweld.evidence.slippage import free_motions
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import Alternative, rival_score
 
-PERTURBATION_DIAMETERS = 0.06
+PERTURBATION_DIAMETERS = RIVAL_SHIFT_DIAMETERS
 """Length of a perturbation, rotations counted as in the information: as far as rivals are."""
 MAX_REMAINING_SHARE = 0.25
 """Share of a perturbation that may be left of it where a pose has come back."""

@@ -25,8 +25,6 @@ NUM_ROUNDS = 4
 """Rounds of reweighting of a plane, from steps that a surface may have to the noise alone."""
 NOISE_REACH = 2.5
 """Depths farther than so many standard deviations from a plane hardly belong to it."""
-MIN_REACH_PIXELS = 1.0
-"""The same in footprints where there is little noise: surfaces curve."""
 MIN_SUPPORT = 0.25
 """Share of a neighbourhood that must lie on its plane: a corner's is a quarter."""
 MIN_FILL_SUPPORT = 0.4
@@ -56,7 +54,8 @@ def clean_depth(
     if sigma < max_noise_pixels * pixel and not has_gaps(depth):
         return depth
     radius = smoothing_radius(sigma / pixel)
-    reach = max(NOISE_REACH * sigma, MIN_REACH_PIXELS * pixel)
+    # Where there is little noise, surfaces still leave the plane by a pixel: they curve.
+    reach = max(NOISE_REACH * sigma, pixel)
     return _fit_planes(np.ascontiguousarray(depth), radius, max(max_step, reach), reach)
 
 

@@ -12,12 +12,12 @@ from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.preparation.range_image import make_range_image
 from scanweld.preparation.resolution import point_spacing
 from scanweld.preparation.sampling import farthest_points
-from scanweld.preparation.sensor import locate_sensor
+from scanweld.preparation.sensor import MIN_POINTS, locate_sensor
 from scanweld.preparation.strays import without_strays
 from scanweld.preparation.support import find_support
 
 MIN_SURFACE_PIXELS = 200
-MIN_SAMPLES = 50
+"""Pixels of surface that a scan must have to be registered."""
 
 
 def prepare(
@@ -41,8 +41,8 @@ def prepare(
         located = replace(located, notes=(*located.notes, note))
     diameter = principal_diameter(points)
     image, mesh = make_range_image(clean, points, resolution, diameter, config)
-    samples = take_samples(image, config)
-    if len(mesh.vertices) < MIN_SURFACE_PIXELS or len(samples.points) < MIN_SAMPLES:
+    samples = take_samples(image, config.num_samples)
+    if len(mesh.vertices) < MIN_SURFACE_PIXELS or len(samples.points) < MIN_POINTS:
         raise InputError(
             f"{scan.name}: only {len(mesh.vertices)} pixels of connected surface among "
             f"{len(scan.points)} points; a scan needs a surface seen from one side"
@@ -88,12 +88,8 @@ def stands_on_support(scan: PreparedScan) -> bool:
     return find_support(points[np.isfinite(scan.image.depth)], scan.image.pixel) is not None
 
 
-def take_samples(image: RangeImage, config: PrepareConfig) -> Samples:
+def take_samples(image: RangeImage, num_samples: int) -> Samples:
     """Oriented points of an image, even by area, off the rims and not at grazing incidence."""
-    points = image.points()
-    toward = -np.einsum("hwk,hwk->hw", image.camera.view_directions(points), image.normals)
-    with np.errstate(invalid="ignore"):
-        usable = np.isfinite(image.depth) & ~image.is_rim & (toward > config.min_cosine)
-    candidates, normals = points[usable], image.normals[usable]
-    chosen = farthest_points(candidates, config.num_samples)
+    candidates, normals = image.points()[image.is_reliable], image.normals[image.is_reliable]
+    chosen = farthest_points(candidates, num_samples)
     return Samples(points=candidates[chosen], normals=normals[chosen])

@@ -6,8 +6,14 @@ from scipy import ndimage
 from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
-from scanweld.geometry.grid import grid_faces
-from scanweld.geometry.mesh import TriangleMesh, border_vertices, pieces, smoothed_normals
+from scanweld.geometry.grid import GAP_ROUNDS, grid_faces
+from scanweld.geometry.mesh import (
+    MIN_PIECE_SHARE,
+    TriangleMesh,
+    border_vertices,
+    pieces,
+    smoothed_normals,
+)
 from scanweld.geometry.prepared import RangeImage
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import RangeScan
@@ -15,20 +21,17 @@ from scanweld.preparation.denoise import CLEAN_NOISE_PIXELS, clean_depth, has_ga
 from scanweld.preparation.silhouette import classify_pixels
 
 MARGIN_DIAMETERS = 0.05
-"""Free space that the image holds around the closed silhouette."""
-MIN_PIECE_SHARE = 0.002
-"""Pieces of fewer pixels than this share of the surface's are no surface."""
+"""Width of the free space around the closed silhouette that is part of the image."""
 MAX_EDGE_PIXELS = 4.0
-"""Points farther apart than this across the line of sight are not joined."""
+"""Points farther apart than this across the line of sight are not joined by a triangle."""
 COARSE_PIXELS = 80
-"""A scan with faces and fewer points across its diameter is rendered finer than its points,"""
-SUBDIVIDED_PIXELS = 160
-"""with as many pixels, at least: else the rims would take most of its surface."""
+"""A scan with faces and fewer points across its diameter is coarse. It is rendered with at least
+twice as many pixels, finer than its points: else the rims would take most of its surface."""
 POINT_PIXELS = 1.6
-"""Pixel of bare points, in spacings: smaller ones would leave most of the surface empty."""
+"""Size of a pixel of points without a grid or faces, in point spacings: smaller pixels would leave
+most of the surface empty."""
 NORMAL_SMOOTHING_ROUNDS = 2
-PINHOLE_ROUNDS = 2
-"""Pinholes are filled from their neighbours so many times, a ring of pixels each time."""
+"""Rounds in which a normal is averaged with those of the neighbours along the mesh."""
 
 
 def make_range_image(
@@ -55,14 +58,19 @@ def make_range_image(
     kind, outside = classify_pixels(
         np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
     )
+    normals, is_rim = normals_image(depth, mesh), rim_pixels(depth, mesh, config.rim_pixels)
+    with np.errstate(invalid="ignore"):
+        is_facing = incidence_cosines(camera, depth, normals) > config.min_cosine
     image = RangeImage(
         camera=camera,
         depth=depth,
-        normals=normals_image(depth, mesh),
+        normals=normals,
         kind=kind,
         outside=outside * pixel,
-        is_rim=rim_pixels(depth, mesh, config.rim_pixels),
+        is_rim=is_rim,
+        is_reliable=np.isfinite(depth) & ~is_rim & is_facing,
         pixel=pixel,
+        jump_pixels=config.jump_pixels,
     )
     return image, mesh
 
@@ -110,7 +118,7 @@ def render_surface(
         depth = np.where(np.isfinite(depth), depth, _splat(points[is_lonely], camera))
     else:
         depth = _splat(points, camera)
-    for _ in range(PINHOLE_ROUNDS):
+    for _ in range(GAP_ROUNDS):
         depth = _fill_pinholes(depth, config.jump_pixels * pixel)
     depth = clean_depth(depth, pixel, config.jump_pixels * pixel, max_noise_pixels)
     depth, mesh = _surface(depth, camera, pixel, config)
@@ -121,7 +129,7 @@ def _pixel_size(spacing: float, diameter: float, config: PrepareConfig) -> float
     """Footprint of a pixel: the points' spacing, or a whole part of it where that is coarse."""
     if spacing * min(COARSE_PIXELS, config.image_pixels) <= diameter:
         return spacing
-    return float(spacing / np.ceil(spacing * SUBDIVIDED_PIXELS / diameter))
+    return float(spacing / np.ceil(spacing * 2 * COARSE_PIXELS / diameter))
 
 
 def working_camera(scan: RangeScan, points: FloatArray, pixel: float, margin: float) -> Camera:
@@ -248,6 +256,12 @@ def normals_image(depth: FloatArray, mesh: TriangleMesh) -> FloatArray:
     image = np.full((*depth.shape, 3), np.nan)
     image[np.isfinite(depth)] = mesh.normals
     return image
+
+
+def incidence_cosines(camera: Camera, depth: FloatArray, normals: FloatArray) -> FloatArray:
+    """Cosines (H, W) of incidence: between normals and the way back to the sensor; NaN off it."""
+    rays = camera.view_directions(camera.unproject_image(depth))
+    return -np.einsum("hwk,hwk->hw", rays, normals)
 
 
 def _in_view(scan: RangeScan, camera: Camera) -> BoolArray:

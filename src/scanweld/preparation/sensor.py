@@ -28,7 +28,7 @@ from scanweld.preparation.viewpoint import (
 logger = logging.getLogger(__name__)
 
 MIN_POINTS = 50
-"""A scan of fewer points is refused."""
+"""A scan of fewer points, or of fewer samples on its surface, is refused."""
 MIN_WIDTH = 1e-6
 """Points whose second principal extent is below this share of the first lie on a line."""
 MAX_FIT_CELLS = 10_000

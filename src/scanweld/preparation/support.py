@@ -7,6 +7,7 @@ has been turned over. So it is left out before scans are registered.
 import numpy as np
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS
 from scanweld.geometry.scan import principal_diameter
 
 NUM_DRAWS = 300
@@ -15,8 +16,6 @@ NUM_TRIED = 2000
 """Points that they are tried on, at most."""
 FLAT_SPACINGS = 1.5
 """Points this near a plane lie in it, in spacings of the points,"""
-FLAT_DEVIATIONS = 4.0
-"""or in standard deviations of those in it."""
 MIN_SHARE = 0.15
 """Share of the points that the plane holds, at least."""
 MIN_ABOVE, MAX_BELOW = 0.03, 0.3
@@ -46,7 +45,7 @@ def find_support(points: FloatArray, spacing: float) -> BoolArray | None:
     height = points @ normal - offset
     within = np.abs(height) <= FLAT_SPACINGS * spacing
     deviation = float(np.sqrt(np.mean(height[within] ** 2)))
-    reach = max(FLAT_SPACINGS * spacing, FLAT_DEVIATIONS * deviation)
+    reach = max(FLAT_SPACINGS * spacing, SIGNIFICANT_SIGMAS * deviation)
     is_above = height > reach
     num_below = int((height < -reach).sum())
     if (

@@ -8,6 +8,7 @@ least steep on average, by a mean over all that are nearly as good as the best.
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.directions import golden_spiral
 from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.resolution import point_spacing
@@ -105,11 +106,8 @@ def _principal_frame(points: FloatArray) -> FloatArray:
 
 
 def _half_sphere(count: int) -> FloatArray:
-    """Unit directions (count, 3) with z > 0, evenly spread on a spiral of golden angles."""
-    k = np.arange(count) + 0.5
-    z, turn = k / count, k * np.pi * (1 + np.sqrt(5))
-    radius = np.sqrt(1 - z * z)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
+    """Unit directions (count, 3) with z > 0, evenly spread."""
+    return golden_spiral((np.arange(count) + 0.5) / count)
 
 
 def _cap(axes: FloatArray, centre: FloatArray, degrees: float) -> FloatArray:

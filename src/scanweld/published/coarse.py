@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanweld.config import CoarseConfig
+from scanweld.config import CoarseConfig, PairsConfig
 from scanweld.evidence.field import make_field
 from scanweld.evidence.visibility import pose_rows
 from scanweld.geometry.arrays import FloatArray
@@ -17,16 +17,14 @@ from scanweld.pairs.hypotheses import Anchors, sweep
 from scanweld.pairs.problem import to_pose
 from scanweld.pairs.search import same_hypothesis, score_poses
 from scanweld.published.consensus import agreed_pose
-from scanweld.published.point_icp import PointAlignment, point_icp
+from scanweld.published.point_icp import MIN_POINTS, PointAlignment, point_icp
 from scanweld.published.signature_matching import match_signatures
 
-MIN_MATCHES = 3
-"""Fewer matched keypoints hold no pose."""
 MIN_BREADTH_DIAMETERS = 0.02
 """Matched keypoints that lie on a line to within this, root mean square, hold no pose either."""
 NUM_TURNS = 36
 """Turns about the normal for each pair of keypoints, where the evidence chooses."""
-EVIDENCE_DIAMETERS = (0.04, 0.02)
+EVIDENCE_DIAMETERS = PairsConfig().tolerance_diameters[:2]
 """Depth tolerance of the evidence, of start poses and of answers."""
 MAX_STARTS = 2000
 """Start poses that are looked at,"""
@@ -77,7 +75,7 @@ def register_as_published(
     """
     if config.start == "consensus":
         start, support = agreed_pose(features_i, features_j, config.num_nearest, i.diameter)
-        if start is None or support < MIN_MATCHES:
+        if start is None or support < MIN_POINTS:
             return _no_pose(support, f"{support} keypoints agree on a pose, 3 are needed")
         return _answer(support, _surface_icp(i, j, start, config))
     if config.start == "evidence":
@@ -101,7 +99,7 @@ def _register_by_fit(
         mutual=config.mutual,
     )
     points_i, points_j = features_i.points[matches.s], features_j.points[matches.t]
-    if len(matches) < MIN_MATCHES:
+    if len(matches) < MIN_POINTS:
         return _no_pose(len(matches), f"{len(matches)} matched keypoints, 3 are needed")
     breadth = min(_breadth(points_i) / i.diameter, _breadth(points_j) / j.diameter)
     if breadth < MIN_BREADTH_DIAMETERS:

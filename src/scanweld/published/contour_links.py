@@ -10,13 +10,11 @@ from scipy.spatial import KDTree
 from scanweld.config import ContoursConfig
 from scanweld.contours.coherence import ContourPair, contour_pair
 from scanweld.contours.contour_sets import ObservedContours
+from scanweld.evidence.icp import MIN_MATCHES
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.point_fit import num_trusted
 from scanweld.geometry.pose import Pose
-
-MIN_MATCHES = 12
-"""Fewer contour points than this say nothing about a pose."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scanweld.config import ContoursConfig
-from scanweld.contours.coherence import LAST_MATCH_PIXELS, coherence
+from scanweld.contours.coherence import LAST_MATCH_PIXELS, OUTLINE_NOISE_PIXELS, coherence
 from scanweld.contours.contour_sets import ObservedContours, observe_contours
 from scanweld.geometry.gauss_newton import spread_of, tukey_weights
 from scanweld.geometry.pose import Pose
@@ -31,9 +31,7 @@ FIRST_MATCH_PIXELS = 16.0
 """Farthest match in the first of the rounds across the outline; it shrinks from there."""
 NUM_OUTLINE_ROUNDS = 10
 """Renderings of the rounds across the outline."""
-OUTLINE_NOISE_PIXELS = 0.3
-"""Standard deviation of an outline that is known to the pixel."""
-STILL_PIXELS = 0.05
+CONVERGED_PIXELS = 0.05
 """The iteration has come to rest when a rendering moves no scan by more."""
 LAST_PHASE = 4
 """One in so many renderings is left for the distance in the image, where that in space is first,"""
@@ -128,7 +126,7 @@ def _until_still(
         moved = _inner_loop(links, poses, _held(links, poses), config, _arm(observed))
         step = _largest_move(observed, poses, moved)
         poses = moved
-        if step < STILL_PIXELS:
+        if step < CONVERGED_PIXELS:
             return poses, True
     return poses, False
 

@@ -11,10 +11,10 @@ from scanweld.geometry.pose import Pose
 
 MAX_ROUNDS = 100
 """Rounds of matching and fitting, at most."""
-STILL = 1e-5
+CONVERGED_STEP = 1e-5
 """The iteration has come to rest when a round moves no point by more, in sizes of the source."""
 MIN_POINTS = 3
-"""Fewer points than this hold no motion,"""
+"""Fewer points than this, or matched keypoints, hold no motion,"""
 MIN_BREADTH = 1e-4
 """nor do points on a line, to within this share of their extent."""
 
@@ -71,7 +71,7 @@ def point_icp(
         step = np.abs(moved.apply(source_points) - pose.apply(source_points)).max()
         pose = moved
         chosen, nearest, squares = _matches(tree, pose.apply(source_points), trim)
-        if step <= STILL * size:
+        if step <= CONVERGED_STEP * size:
             converged = True
             break
     return PointAlignment(

@@ -1,14 +1,15 @@
 """Joint refinement: one robust least squares over the poses of all scans at once."""
 
 import logging
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 
 from scanweld.config import RefineConfig
-from scanweld.geometry.matches import Matches
+from scanweld.contours.coherence import OUTLINE_NOISE_PIXELS, ContourMatcher
+from scanweld.geometry.gauss_newton import lever_arm
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.refinement.least_squares import Found, Term, move_poses, weighted_terms
@@ -22,15 +23,10 @@ MIN_MATCHES = 20
 """A direction of a pair with fewer matches than this has no say."""
 SURFACE_NOISE_DIAMETERS = 1e-7
 """Least spread of surface residuals: exact data have none."""
-OUTLINE_NOISE_PIXELS = 0.3
-"""Least spread of contour residuals: an outline is known to the pixel, no better."""
 MAX_STEP_DIAMETERS = 0.1
 """A scan moves no farther in a round: matches say nothing about longer steps."""
 NUM_CONTOUR_ROUNDS = 4
 """Contours take part in the last rounds: they cost most, and are sharp at nearly right poses."""
-
-ContourMatcher = Callable[[int, int, Pose], Matches]
-"""Contour matches of scans i and j, by index, at the pose ``j_from_i``: in the frame of j."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -68,7 +64,7 @@ def refine_poses(
     world_from_sensor: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
     config: RefineConfig,
-    contour_matches: ContourMatcher | None = None,
+    contours: ContourMatcher | None = None,
 ) -> Refinement:
     """Refine all poses together by surface and contour matches.
 
@@ -82,7 +78,7 @@ def refine_poses(
         world_from_sensor: Start poses of those to refine, by index in ``scans``.
         pairs: Adjacent views, whose contours are matched.
         config: Rounds, radii and the weight of the contours.
-        contour_matches: Finds contour matches; without it there is no contour term.
+        contours: Of all scans; without them there is no contour term.
     """
     poses = dict(sorted(world_from_sensor.items()))
     if len(poses) < 2:
@@ -96,12 +92,12 @@ def refine_poses(
     step = 0.0
     for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
         surface = match_surfaces(sources, poses, float(radius) * diameter)
-        contour: list[Found] = []
-        if contour_matches is not None and n >= config.num_rounds - contour_rounds:
+        outlines: list[Found] = []
+        if contours is not None and n >= config.num_rounds - contour_rounds:
             touching = {(min(i, j), max(i, j)) for i, j, _ in surface}
-            contour = _match_contours(poses, sorted(touching & views), contour_matches)
-        terms = weighted_terms(surface, contour, poses, config.contour_weight, noise)
-        poses, moved = move_poses(terms, poses, diameter / 3, MAX_STEP_DIAMETERS * diameter)
+            outlines = _match_contours(poses, sorted(touching & views), contours)
+        terms = weighted_terms(surface, outlines, poses, config.contour_weight, noise)
+        poses, moved = move_poses(terms, poses, lever_arm(diameter), MAX_STEP_DIAMETERS * diameter)
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
     surface = match_surfaces(sources, poses, config.match_diameters[1] * diameter)
@@ -137,12 +133,12 @@ def match_surfaces(
 def _match_contours(
     poses: Mapping[int, Pose],
     views: Sequence[tuple[int, int]],
-    contour_matches: ContourMatcher,
+    contours: ContourMatcher,
 ) -> list[Found]:
     found = []
     for pair in views:
         for i, j in (pair, pair[::-1]):
-            matches = contour_matches(i, j, poses[j].inverse() @ poses[i])
+            matches = contours.matches(i, j, poses[j].inverse() @ poses[i])
             if len(matches) >= MIN_MATCHES:
                 found.append((i, j, matches))
     return found

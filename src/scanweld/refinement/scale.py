@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import damped, motion_of
+from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS, damped, lever_arm, motion_of
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.refinement.least_squares import Term, weighted_terms
@@ -22,11 +22,9 @@ MATCH_DIAMETERS = 0.012
 CORRELATED_MATCHES = 30.0
 """Neighbouring matches err alike: so many are worth one."""
 NUM_ROUNDS = 4
-NUM_UNKNOWNS = 7
+"""Steps of least squares, each with new matches."""
 MIN_ERROR = 0.004
-"""Scales that are off by less are within what sensors do,"""
-MIN_DEVIATIONS = 4.0
-"""and so are those within so many standard deviations."""
+"""Scales that are off by less are within the calibration of sensors."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -45,7 +43,7 @@ class ScaleEstimate:
     def is_off(self) -> bool:
         """Whether the scan is surely in another unit than the others, by however little."""
         error = abs(self.factor - 1.0)
-        return error > max(MIN_ERROR, MIN_DEVIATIONS * self.deviation)
+        return error > max(MIN_ERROR, SIGNIFICANT_SIGMAS * self.deviation)
 
     def words(self) -> str:
         """What is wrong with the scan's scale."""
@@ -72,6 +70,7 @@ def estimate_scales(
     poses = dict(sorted(world_from_sensor.items()))
     diameter = float(np.median([scans[k].diameter for k in poses]))
     sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
+    arm = lever_arm(diameter)
     logs = dict.fromkeys(poses, 0.0)
     deviations: dict[int, float] = {}
     order: list[int] = []
@@ -82,14 +81,14 @@ def estimate_scales(
         if len(order) < 2:
             return {}
         centres = {k: poses[k].apply(grown[k].points.mean(axis=0)) for k in order}
-        twists, steps, spreads = _solve(terms, order, centres, diameter / 3)
+        twists, steps, spreads = _solve(terms, order, centres, arm)
         middle = np.mean([centres[k] for k in order], axis=0)
         for k, twist, step, spread in zip(order, twists, steps, spreads, strict=True):
             # Grown about the sensor in the next round, it is moved back to where it was.
             about = poses[k].translation
             back = (1.0 - np.exp(step)) * (centres[k] - about)
             stay = Pose(rotation=np.eye(3), translation=back)
-            poses[k] = motion_of(twist, middle, diameter / 3) @ stay @ poses[k]
+            poses[k] = motion_of(twist, middle, arm) @ stay @ poses[k]
             logs[k] -= step
             deviations[k] = float(spread)
     usual = float(np.median([logs[k] for k in order]))
@@ -121,8 +120,9 @@ def _solve(
     terms: Sequence[Term], order: Sequence[int], centres: Mapping[int, FloatArray], arm: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Twists (N, 6) and growths (N,) that make surfaces agree, and the growths' deviations."""
-    size = NUM_UNKNOWNS * len(order)
-    place = {k: slice(NUM_UNKNOWNS * n, NUM_UNKNOWNS * (n + 1)) for n, k in enumerate(order)}
+    unknowns = 7  # of each scan: rotation, translation, growth
+    size = unknowns * len(order)
+    place = {k: slice(unknowns * n, unknowns * (n + 1)) for n, k in enumerate(order)}
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     centre = np.mean([centres[k] for k in order], axis=0)
     square, count = 0.0, 0.0
@@ -141,16 +141,16 @@ def _solve(
         gradient[b] += (weights * by_j).T @ term.residuals
         square += float(term.weights @ term.residuals**2)
         count += float(term.weights.sum())
-    growths = np.arange(NUM_UNKNOWNS - 1, size, NUM_UNKNOWNS)
+    growths = np.arange(unknowns - 1, size, unknowns)
     # The first scan stays, and a growth of all together is not seen: theirs sum to 0.
     normal[np.ix_(growths, growths)] += np.trace(normal) / size
-    free = np.arange(NUM_UNKNOWNS - 1, size)
+    free = np.arange(unknowns - 1, size)
     inverse = np.linalg.inv(damped(normal[np.ix_(free, free)]))
     solved = np.zeros(size)
     solved[free] = -inverse @ gradient[free]
     variance = np.zeros(size)
     variance[free] = np.diag(inverse) * CORRELATED_MATCHES * square / max(count, 1e-300)
-    steps = solved.reshape(-1, NUM_UNKNOWNS)
+    steps = solved.reshape(-1, unknowns)
     return steps[:, :-1], steps[:, -1], np.sqrt(variance[growths])
 
 

@@ -6,12 +6,10 @@ import numpy as np
 from numba import njit
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-from scanweld.geometry.matches import Matches
+from scanweld.geometry.matches import MIN_AGREEMENT, Matches
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
 
-MIN_AGREEMENT = 0.8
-"""Cosine of the two normals below which a match is refused."""
 MIN_COSINE = 0.2
 """Pixels seen at a more grazing angle than this (cosine) take no part: range is poor there."""
 NUM_WALKS = 3
