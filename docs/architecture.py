@@ -23,7 +23,8 @@ LAYERS = (
     ("confidence", "knowledge"),
     ("graph", "published", "reconstruction"),
     ("pairs", "fusion", "evaluation"),
-    ("evidence", "heat", "refinement", "contours", "preparation", "work", "io"),
+    ("evidence", "heat", "refinement", "preparation", "work", "io"),
+    ("contours",),
     ("geometry", "config"),
     ("errors",),
 )
