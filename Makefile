@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-fast test-benchmarks lint clean benchmarks paper trust calibration
+.PHONY: demo test test-fast test-benchmarks lint docs clean benchmarks paper trust calibration
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
@@ -26,6 +26,10 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+# The documentation as a site, into site/; warnings are errors.
+docs: $(VENV)/.installed-docs
+	$(BIN)/mkdocs build --strict
 
 # The numbers of README.md, docs/benchmarks.md and docs/model.md; needs the Stanford data, takes a
 # quarter of an hour. Small and without the data: make benchmarks BENCHMARKS="--quick --out bench"
@@ -52,7 +56,7 @@ calibration: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.trust --pages
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) demo site
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -65,4 +69,8 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 
 $(VENV)/.installed-bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,bench]'
+	touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	touch $@

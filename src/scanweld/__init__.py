@@ -4,6 +4,8 @@ In short: ``scanweld.run(scanweld.read_scans("scans/"))``. One stage alone: ``pr
 ``register_pair``, ``refine``, ``fuse``, ``evaluate``.
 """
 
+from importlib.metadata import version
+
 from scanweld.work import (
     kernels as kernels,  # first: it says where the kernels of the others are kept
 )
@@ -53,6 +55,8 @@ from scanweld.reconstruction import (
     Verdict,
 )
 from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+
+__version__ = version("scanweld")
 
 __all__ = [
     "Camera",
