@@ -217,13 +217,12 @@ def _registrar(
     """Prepare scans as a run does; the method's own way to register two of them, by index."""
     config = Config(pairs=PairsConfig.model_validate({"keypoints": anchors}))
     prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), scans, workers))
-    diameter = float(np.median([scan.diameter for scan in prepared]))
-    fields = list(map_in_order(lambda scan: make_field(scan, diameter), prepared, workers))
+    fields = list(map_in_order(make_field, prepared, workers))
     features = [None] * len(prepared)
     if anchors != "even":
         features = list(map_in_order(lambda scan: describe(scan, config.heat), prepared, workers))
     contours = contour_matcher(prepared, config.contours)
-    return prepared, pair_registrar(prepared, features, fields, contours, diameter, config)
+    return prepared, pair_registrar(prepared, features, fields, contours, config).register
 
 
 def table(answers: Sequence[Answer]) -> str:

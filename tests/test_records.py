@@ -84,8 +84,8 @@ def a_result() -> PairResult:
         rms=float("nan"),
         sliding=Slippage(slide=Slide.PLANE, axis=np.array([0.0, 0.0, 1.0]), point=None),
         symmetry=Symmetry(likeness=next(iter(Likeness)), angles_deg=(90.0, 180.0)),
-        is_marked=True,
-        tied_too=(pose,),
+        rests_on_feature=True,
+        further_ties=(pose,),
     )
 
 

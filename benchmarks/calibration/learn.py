@@ -12,9 +12,9 @@ from benchmarks.calibration.collect import CONFIG
 from benchmarks.calibration.fit import Examples, fit, held_out_probabilities, make_examples
 from benchmarks.kept import CALIBRATED, Record, code_digest
 from benchmarks.scores import Stated
-from scanweld.confidence.assess import as_held, close_open
-from scanweld.confidence.links import links
+from scanweld.confidence.assess import cap_by_links, cap_undecided
 from scanweld.confidence.model import Calibration
+from scanweld.confidence.ties import ties_of
 from scanweld.geometry.pose import Pose
 from scanweld.graph.view_graph import Component
 from scanweld.pairs.result import PairKind, PairResult
@@ -44,7 +44,7 @@ def learn(records: Sequence[Record], command: str) -> Learned:
     pairs = make_examples([p["grounds"] for p in told], [p["right"] for p in told], groups)
     probabilities = zip(held_out_probabilities(pairs).tolist(), told, strict=True)
     confidences = [
-        close_open(p, _as_told(pair), pair["grounds"], CONFIG) for p, pair in probabilities
+        cap_undecided(p, _as_told(pair), pair["grounds"], CONFIG) for p, pair in probabilities
     ]
     scans = _scan_examples(records, confidences)
     held = zip(held_out_probabilities(scans).tolist(), scans.rows(), strict=True)
@@ -62,7 +62,9 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         pairs=pairs,
         scans=scans,
         stated_pairs=Stated(np.array(confidences), pairs.is_right),
-        stated_scans=Stated(np.array([as_held(p, row, CONFIG) for p, row in held]), scans.is_right),
+        stated_scans=Stated(
+            np.array([cap_by_links(p, row, CONFIG) for p, row in held]), scans.is_right
+        ),
     )
 
 
@@ -100,5 +102,5 @@ def _links(
             poses={at[scan["name"]]: Pose.identity() for scan in of},
             reference=next(at[scan["name"]] for scan in of if scan["reference"]),
         )
-        tied.update({names[k]: link for k, link in links(component, numbered).items()})
+        tied.update({names[k]: link for k, link in ties_of(component, numbered).items()})
     return tied
