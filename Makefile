@@ -16,13 +16,10 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
-# The numbers of README.md and docs/benchmarks.md; needs the Stanford data, takes a quarter of an hour.
+# The numbers of README.md, docs/benchmarks.md and docs/model.md; needs the Stanford data, takes a
+# quarter of an hour. Small and without the data: make benchmarks BENCHMARKS="--quick --out bench"
 benchmarks: $(VENV)/.installed-bench
-	$(BIN)/python benchmarks/run.py --seeds 3 --out docs/data/sets.json
-	$(BIN)/python benchmarks/pairs.py --seeds 3 --keypoints heat even mixed --out docs/data/pairs.json --plot docs/pairs.png
-	$(BIN)/python benchmarks/keypoints.py --out docs/data/keypoints.json
-	$(BIN)/python benchmarks/model.py --out docs/data/model.json
-	$(BIN)/python benchmarks/pages.py
+	$(BIN)/python -m benchmarks $(BENCHMARKS)
 
 # The paper's tables and figures beside ours, into docs/paper; needs the Stanford data, takes up to
 # an hour on 2 cores, and goes on where it was stopped. In two minutes and without the data:
@@ -31,7 +28,8 @@ paper: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.paper $(PAPER)
 
 # What it asserts under hard conditions, held against the truth, into docs/trust.md; up to an hour
-# on 2 cores, and goes on where it was stopped. A handful of runs: make trust TRUST="--quick --out trust"
+# on 2 cores, and goes on where it was stopped. Which seeds it may take: benchmarks/SEEDS.md. Only to
+# see that it works: make trust TRUST="--quick --out trust"
 trust: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.trust --compare $(TRUST)
 

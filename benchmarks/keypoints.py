@@ -66,9 +66,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file of all comparisons of two views")
     options = parser.parse_args()
     if options.quick:
-        compared = comparisons(
-            "creature", creature(voxels=100), "z", AZIMUTHS_DEG[:1], GAPS_DEG[:1]
-        )
+        compared = comparisons("creature", creature(voxels=80), "z", (0,), (30,))
     else:
         data = data_folder(None) / "meshes"
         paths = options.meshes or [data / "armadillo.ply", data / "bunny.ply"]

@@ -18,7 +18,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -51,10 +51,10 @@ from scanweld.work.threads import map_in_order, single_threaded_algebra
 
 NOISE = 0.001
 """Of depth, in diameters of the virtual object."""
-NUM_SAMPLES = 100_000
 COMMON_RESOLUTIONS = 2.0
 """Where every surface has something within this, they are compared."""
-RIVALS = {"Open3D TSDF": tsdf, "Open3D Poisson": poisson}
+Rival = Callable[[Sequence[Shape], float], TriangleMesh]
+RIVALS: Mapping[str, Rival] = {"Open3D TSDF": tsdf, "Open3D Poisson": poisson}
 FLOORS = {
     "virtual": {"accuracy_90": 0.6, "completeness": 0.98},
     "real": {"accuracy_median": 0.15, "accuracy_90": 0.40},
@@ -65,15 +65,16 @@ FLOORS = {
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Size:
-    """How many virtual scans, a pixel's footprint on the object in its diameters, and the many."""
+    """Virtual scans, a pixel's footprint in object diameters, samples of a surface, many scans."""
 
     num_views: int = 12
     footprint: float = 0.0045
+    num_samples: int = 100_000
     many: int = 60
     many_pixels: float = 1480.0
 
 
-QUICK = Size(num_views=6, footprint=0.01, many=3, many_pixels=100.0)
+QUICK = Size(num_views=6, footprint=0.012, num_samples=8000, many=3, many_pixels=80.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -88,6 +89,7 @@ class Subject:
         reference: The surface, in about the same frame.
         seen: (N, 3) points spread over the part of it that was seen.
         resolution: Of the scans.
+        num_samples: Of a surface.
     """
 
     kind: str
@@ -97,6 +99,7 @@ class Subject:
     reference: TriangleMesh
     seen: FloatArray
     resolution: float
+    num_samples: int
 
     @property
     def voxel(self) -> float:
@@ -109,9 +112,9 @@ class Subject:
 
     def distances(self, mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
         """Of the model from the reference, and of what was seen from the model; after one ICP."""
-        pose = fit_surface(mesh, self.reference)
+        pose = fit_surface(mesh, self.reference, num_samples=self.num_samples // 2)
         moved = replace(mesh, vertices=pose.apply(mesh.vertices))
-        points, _ = sample_surface(moved, NUM_SAMPLES, np.random.default_rng(0))
+        points, _ = sample_surface(moved, self.num_samples, np.random.default_rng(0))
         return surface_distances(points, self.reference), surface_distances(self.seen, moved)
 
 
@@ -149,11 +152,12 @@ def virtual(options: argparse.Namespace) -> list[Json]:
         scans=prepared,
         poses=[truth[scan.name] @ scan.scan_from_sensor for scan in prepared],
         reference=mesh,
-        seen=_seen(mesh, scans, truth, resolution),
+        seen=_seen(mesh, scans, truth, resolution, size.num_samples),
         resolution=resolution,
+        num_samples=size.num_samples,
     )
     found = replace(right, name=name, poses=_found(scans, prepared, truth, options.workers))
-    records = compared(found, options.workers)
+    records = compared(found, options.workers, {} if options.quick else RIVALS)
     return [*records, fidelity(right, right.fused(options.workers))]
 
 
@@ -163,15 +167,16 @@ def real(options: argparse.Namespace) -> list[Json]:
     scans = [read_scan(folder / f"{name}.ply") for name in BUNNY]
     reference = read_mesh(folder / "bun_zipper.ply")
     prepared = [prepare(scan, Config().prepare) for scan in scans]
-    truth = read_poses(folder / "poses.json").poses
+    truth, num_samples = read_poses(folder / "poses.json").poses, Size().num_samples
     subject = Subject(
         kind="real",
         name="bunny",
         scans=prepared,
         poses=_found(scans, prepared, truth, options.workers),
         reference=reference,
-        seen=sample_surface(reference, NUM_SAMPLES, np.random.default_rng(0))[0],
+        seen=sample_surface(reference, num_samples, np.random.default_rng(0))[0],
         resolution=float(np.median([scan.resolution for scan in prepared])),
+        num_samples=num_samples,
     )
     return compared(subject, options.workers)
 
@@ -207,13 +212,13 @@ def fuse_folder(folder: Path, out: Path, workers: int) -> None:
     out.write_text("".join(f"{key} {value}\n" for key, value in told.items()))
 
 
-def compared(subject: Subject, workers: int) -> list[Json]:
+def compared(subject: Subject, workers: int, rivals: Mapping[str, Rival] = RIVALS) -> list[Json]:
     """Our model, its rivals and the scans themselves, from the same poses."""
     posed = zip(subject.scans, subject.poses, strict=True)
     shapes = [shape_of(scan, pose) for scan, pose in posed]
     makers = {
         "scanweld": lambda: subject.fused(workers),
-        **{name: lambda make=make: make(shapes, subject.voxel) for name, make in RIVALS.items()},
+        **{name: lambda make=make: make(shapes, subject.voxel) for name, make in rivals.items()},
     }
     models, seconds = {}, {"single scans": 0.0}
     for name, make in makers.items():
@@ -306,10 +311,14 @@ def _found(
 
 
 def _seen(
-    mesh: TriangleMesh, scans: Sequence[RangeScan], truth: Mapping[str, Pose], footprint: float
+    mesh: TriangleMesh,
+    scans: Sequence[RangeScan],
+    truth: Mapping[str, Pose],
+    footprint: float,
+    num_samples: int,
 ) -> FloatArray:
     """Points (N, 3) spread over what at least one sensor saw of a mesh."""
-    points, face_of = sample_surface(mesh, NUM_SAMPLES, np.random.default_rng(0))
+    points, face_of = sample_surface(mesh, num_samples, np.random.default_rng(0))
     normals = face_normals(mesh.vertices, mesh.faces)[face_of]
     seen = np.zeros(len(points), dtype=bool)
     for scan in scans:

@@ -56,7 +56,7 @@ def seeds_told(seeds: Iterable[int]) -> str:
     remarks = " ".join(each.remark for each in spent)
     return (
         f"{told}. **They are spent** (`benchmarks/SEEDS.md`: {', '.join(map(str, spent))}): code "
-        "was changed after results with them had been looked at. So the figures below are figures of "
-        f"development, and do not show what unseen scans would give. {remarks}".rstrip()
+        "was changed after results with them had been looked at. So the figures below are figures "
+        f"of development, and do not show what unseen scans would give. {remarks}".rstrip()
         + "\n"
     )

@@ -87,7 +87,7 @@ SETS: Mapping[str, BenchmarkSet] = {
     "bunny10-rotated": replace(_BUNNY, any_rotation=True),
 }
 QUICK: Mapping[str, BenchmarkSet] = {
-    "quick": BenchmarkSet(floors=_WIDE_STEPS, num_simulated=5, pixels=120.0)
+    "quick": BenchmarkSet(floors=_floors((1.0, 2.0), (1.0, 2.0)), num_simulated=5, pixels=120.0)
 }
 """Needs no data."""
 

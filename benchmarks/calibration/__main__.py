@@ -33,7 +33,7 @@ def main() -> int:
     )
     learned = learn(measured(Sets(num_sets=options.sets), study), command)
     package = options.out / CALIBRATION.name if options.quick else CALIBRATION
-    print(calibration_told(write_all(learned, package, options.out)))
+    print(calibration_told(write_all(learned, package, options.out, quick=options.quick)))
     return 0
 
 

@@ -92,9 +92,10 @@ def held_out_probabilities(examples: Examples) -> FloatArray:
 
 
 def folds(examples: Examples) -> list[BoolArray]:
-    """Parts of the examples that share no set."""
+    """Parts of the examples that share no set; none that leaves nothing to learn from."""
     _, order = np.unique(examples.groups, return_inverse=True)
-    return [order % NUM_FOLDS == k for k in range(NUM_FOLDS)]
+    parts = (order % NUM_FOLDS == k for k in range(NUM_FOLDS))
+    return [part for part in parts if not part.all()]
 
 
 def fit_curves(examples: Examples) -> dict[str, Curve]:
