@@ -74,32 +74,21 @@ class Size:
     many_pixels: float = 1480.0
 
 
-QUICK = Size(num_views=6, footprint=0.012, num_samples=8000, many=3, many_pixels=80.0)
+QUICK = Size(num_views=6, footprint=0.008, num_samples=8000, many=3, many_pixels=80.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Subject:
-    """Scans with poses, and the surface that they show.
+    """Scans with poses, and the surface that they show."""
 
-    Attributes:
-        kind: Virtual or real.
-        name: In the tables.
-        scans: Prepared.
-        poses: world_from_sensor of each.
-        reference: The surface, in about the same frame.
-        seen: (N, 3) points spread over the part of it that was seen.
-        resolution: Of the scans.
-        num_samples: Of a surface.
-    """
-
-    kind: str
-    name: str
-    scans: Sequence[PreparedScan]
-    poses: Sequence[Pose]
-    reference: TriangleMesh
-    seen: FloatArray
-    resolution: float
-    num_samples: int
+    kind: str  # Virtual or real
+    name: str  # In the tables
+    scans: Sequence[PreparedScan]  # Prepared
+    poses: Sequence[Pose]  # world_from_sensor of each
+    reference: TriangleMesh  # The surface, in about the same frame
+    seen: FloatArray  # (N, 3) points spread over the part of it that was seen
+    resolution: float  # Of the scans
+    num_samples: int  # Of a surface
 
     @property
     def voxel(self) -> float:

@@ -60,18 +60,9 @@ MIN_AUC = 0.97
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What was made of one pair.
+    """What was made of one pair."""
 
-    Attributes:
-        anchors: What the hypotheses hung on: "mixed", "heat" or "even".
-        rotation_deg: Error of the first answer; None where there is no answer.
-        translation_percent: The same, in percent of the object's diameter.
-        score: Of the first answer.
-        evidence: Shares of samples behind that score.
-        rank: Place of the first right answer, from 1; None if none is right.
-    """
-
-    anchors: str
+    anchors: str  # What the hypotheses hung on: "mixed", "heat" or "even"
     object: str
     seed: int
     i: str
@@ -79,13 +70,13 @@ class Answer:
     overlap: float
     gap_deg: float
     kind: str
-    rotation_deg: float | None
-    translation_percent: float | None
-    score: float | None
-    evidence: dict[str, float]
+    rotation_deg: float | None  # Error of the first answer; None where there is no answer
+    translation_percent: float | None  # The same, in percent of the object's diameter
+    score: float | None  # Of the first answer
+    evidence: dict[str, float]  # Shares of samples behind that score
     margin: float
     observability: float
-    rank: int | None
+    rank: int | None  # Place of the first right answer, from 1; None if none is right
     seconds: float
 
     @property
@@ -104,15 +95,12 @@ class Answer:
 
 @dataclass(frozen=True, kw_only=True)
 class Scans:
-    """Scans of an object, their true poses, and the pairs that are asked for.
-
-    Attributes:
-        pairs: (i, j) -> overlap, and rotation in degrees between the two.
-    """
+    """Scans of an object, their true poses, and the pairs that are asked for."""
 
     name: str
     scans: list[RangeScan]
     world_from_scan: Mapping[str, Pose]
+    # (i, j) -> overlap, and rotation in degrees between the two
     pairs: Mapping[tuple[str, str], tuple[float, float]]
 
 

@@ -30,24 +30,17 @@ def dragon(step_deg: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class BenchmarkSet:
-    """Scans of one object that are put together in one run.
+    """Scans of one object that are put together in one run."""
 
-    Attributes:
-        folder: Of the data, with a poses.json; empty for the simulated creature.
-        scans: Names of the scans in that folder.
-        any_rotation: Whether files are turned any way, not only about their viewing axis.
-        floors: Most that each value of a run may be, by its name; errors are in degrees and in
-            percent of the object's diameter. All scans have to be right.
-        num_simulated: Scans of the creature,
-        pixels: and their pixels across it.
-    """
-
-    folder: str = ""
-    scans: tuple[str, ...] = ()
+    folder: str = ""  # Of the data, with a poses.json; empty for the simulated creature
+    scans: tuple[str, ...] = ()  # Names of the scans in that folder
+    # Whether files are turned any way, not only about their viewing axis
     any_rotation: bool = False
+    # Most that each value of a run may be, by its name; errors are in degrees and in percent of the
+    # object's diameter. All scans have to be right.
     floors: Mapping[str, float]
-    num_simulated: int = 10
-    pixels: float = 300.0
+    num_simulated: int = 10  # Scans of the creature
+    pixels: float = 300.0  # and their pixels across it
 
     @property
     def num_scans(self) -> int:
@@ -94,19 +87,12 @@ QUICK: Mapping[str, BenchmarkSet] = {
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Truth:
-    """What a made set is held against.
+    """What a made set is held against."""
 
-    Attributes:
-        poses: Reference world_from_scan by the new names.
-        originals: New name -> the name that the scan had.
-        centroids: Of each scan, in its new frame.
-        diameter: Of the object.
-    """
-
-    poses: Mapping[str, Pose]
-    originals: Mapping[str, str]
-    centroids: Mapping[str, FloatArray]
-    diameter: float
+    poses: Mapping[str, Pose]  # Reference world_from_scan by the new names
+    originals: Mapping[str, str]  # New name -> the name that the scan had
+    centroids: Mapping[str, FloatArray]  # Of each scan, in its new frame
+    diameter: float  # Of the object
 
 
 def data_folder(given: Path | None) -> Path:

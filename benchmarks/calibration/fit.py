@@ -21,19 +21,12 @@ MIN_COUNTED = 20
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Examples:
-    """What was seen, to learn from.
+    """What was seen, to learn from."""
 
-    Attributes:
-        names: Of the F grounds.
-        grounds: (N, F).
-        is_right: (N,).
-        groups: (N,) number of the set that each comes from: sets have their own objects.
-    """
-
-    names: tuple[str, ...]
-    grounds: FloatArray
-    is_right: BoolArray
-    groups: IntArray
+    names: tuple[str, ...]  # Of the F grounds
+    grounds: FloatArray  # (N, F)
+    is_right: BoolArray  # (N,)
+    groups: IntArray  # (N,) number of the set that each comes from: sets have their own objects
 
     def __len__(self) -> int:
         return len(self.is_right)

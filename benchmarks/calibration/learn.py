@@ -23,21 +23,13 @@ from scanweld.pairs.verdict import no_pose
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Learned:
-    """What all sets together say.
+    """What all sets together say."""
 
-    Attributes:
-        calibration: The models.
-        pairs: Examples of pairs,
-        scans: of scans, with the held-out confidences of their pairs in their links.
-        stated_pairs: Held-out confidences of the pairs,
-        stated_scans: and of the scans.
-    """
-
-    calibration: Calibration
-    pairs: Examples
-    scans: Examples
-    stated_pairs: Stated
-    stated_scans: Stated
+    calibration: Calibration  # The models
+    pairs: Examples  # Of pairs
+    scans: Examples  # Of scans, with the held-out confidences of their pairs in their links
+    stated_pairs: Stated  # Held-out confidences of the pairs
+    stated_scans: Stated  # Held-out confidences of the scans
 
 
 def learn(records: Sequence[Record], command: str) -> Learned:

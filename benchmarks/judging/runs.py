@@ -14,17 +14,11 @@ QUICK = ("64 pixels across",)
 
 @dataclass(kw_only=True)
 class Runs(Kept):
-    """Runs of scenarios by seeds.
+    """Runs of scenarios by seeds."""
 
-    Attributes:
-        scenarios: Names.
-        seeds: How many of each, at most.
-        first_seed: The first seed of each.
-    """
-
-    scenarios: Sequence[str] = tuple(SCENARIOS)
-    seeds: int = 10**6
-    first_seed: int = FIRST_FRESH
+    scenarios: Sequence[str] = tuple(SCENARIOS)  # Names
+    seeds: int = 10**6  # How many of each, at most
+    first_seed: int = FIRST_FRESH  # The first seed of each
     NAME: str = "trust"
     TITLE: str = "Trust"
 

@@ -37,33 +37,20 @@ CRASH, ERROR = "crash", "error"
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScanOutcome:
-    """What became of a scan; by default it is not placed.
+    """What became of a scan; by default it is not placed."""
 
-    Attributes:
-        source: What it was made from, in words.
-        world: Number of its world; None if it belongs nowhere.
-        is_open: Whether nothing that it shows determines its pose.
-        factor: By which it is too large.
-        verdict: Good, doubtful or unplaced.
-        standing: Right, wrong or unplaced.
-        is_apart: Whether it lies in another component than most of its world.
-        confidence: That its pose is right, as the report says; None if it is unplaced.
-        rotation_deg: Error of its pose; None where there is none.
-        translation_percent: The same, in percent of the object's diameter.
-        reason: What the report says of it, where it is not both good and right.
-    """
-
-    source: str
-    world: int | None
-    is_open: bool
-    factor: float
-    verdict: str = str(ScanVerdict.UNPLACED)
-    standing: str = str(Standing.UNPLACED)
-    is_apart: bool = False
+    source: str  # What it was made from, in words
+    world: int | None  # Number of its world; None if it belongs nowhere
+    is_open: bool  # Whether nothing that it shows determines its pose
+    factor: float  # By which it is too large
+    verdict: str = str(ScanVerdict.UNPLACED)  # Good, doubtful or unplaced
+    standing: str = str(Standing.UNPLACED)  # Right, wrong or unplaced
+    is_apart: bool = False  # Whether it lies in another component than most of its world
+    # That its pose is right, as the report says; None if it is unplaced
     confidence: float | None = None
-    rotation_deg: float | None = None
-    translation_percent: float | None = None
-    reason: str = ""
+    rotation_deg: float | None = None  # Error of its pose; None where there is none
+    translation_percent: float | None = None  # The same, in percent of the object's diameter
+    reason: str = ""  # What the report says of it, where it is not both good and right
 
     @property
     def is_right(self) -> bool:
@@ -107,21 +94,13 @@ class ScanOutcome:
 
 @dataclass(frozen=True, slots=True)
 class PairOutcome:
-    """What became of a pair that has a pose.
+    """What became of a pair that has a pose."""
 
-    Attributes:
-        confidence: That its pose is right, as the report says.
-        kind: What the two scans alone say.
-        is_accepted: Whether the view graph uses it.
-        is_right: Whether its pose is right.
-        is_open: Whether nothing that the two show determines it.
-    """
-
-    confidence: float
-    kind: PairKind
-    is_accepted: bool
-    is_right: bool
-    is_open: bool
+    confidence: float  # That its pose is right, as the report says
+    kind: PairKind  # What the two scans alone say
+    is_accepted: bool  # Whether the view graph uses it
+    is_right: bool  # Whether its pose is right
+    is_open: bool  # Whether nothing that the two show determines it
 
     def brief(self) -> list[Any]:
         """For JSON: thousands of these stand in it."""

@@ -25,18 +25,14 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Body:
-    """An object, standing along z.
+    """An object, standing along z."""
 
-    Attributes:
-        mesh: Faces counter-clockwise seen from outside.
-        is_symmetric: Whether a motion leaves the object as it is: then the pose of a scan is not
-            determined by what it shows.
-        unmarked: The same object without the mark that alone tells it from a symmetric one; None
-            where there is no such mark.
-    """
-
-    mesh: TriangleMesh
+    mesh: TriangleMesh  # Faces counter-clockwise seen from outside
+    # Whether a motion leaves the object as it is: then the pose of a scan is not determined by what
+    # it shows
     is_symmetric: bool = False
+    # The same object without the mark that alone tells it from a symmetric one; None where there is
+    # no such mark
     unmarked: TriangleMesh | None = None
 
 

@@ -39,61 +39,38 @@ class Group(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Scenario:
-    """How to make the scans of a run.
+    """How to make the scans of a run."""
 
-    Attributes:
-        group: What is asked of it.
-        seeds: How many runs.
-        body: Name of the object.
-        views: Where it is scanned from.
-        taking: What else is in front of the sensor.
-        noise: What the sensor does to depth.
-        crop: What is cut off the scans.
-        disturbances: What happens to the scans after that, one after the other.
-        strangers: Scans that are added.
-        min_overlap: Of the pairs that connect all scans of the object; views are drawn anew until
-            this holds.
-        spoils_first: Whether the first scan is not to be placed, so that the others have to be
-            connected without it.
-    """
-
-    group: Group
-    seeds: int
-    body: str = "thing"
-    views: Views
-    taking: Taking = take_shots
-    noise: NoiseModel = SLIGHT
-    crop: Disturbance | None = None
+    group: Group  # What is asked of it
+    seeds: int  # How many runs
+    body: str = "thing"  # Name of the object
+    views: Views  # Where it is scanned from
+    taking: Taking = take_shots  # What else is in front of the sensor
+    noise: NoiseModel = SLIGHT  # What the sensor does to depth
+    crop: Disturbance | None = None  # What is cut off the scans
+    # What happens to the scans after that, one after the other
     disturbances: tuple[Disturbance, ...] = ()
-    strangers: Strangers | None = None
+    strangers: Strangers | None = None  # Scans that are added
+    # Of the pairs that connect all scans of the object; views are drawn anew until this holds
     min_overlap: float = CHAIN_OVERLAP
+    # Whether the first scan is not to be placed, so that the others have to be connected without it
     spoils_first: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Scene:
-    """What the main job is given, and what it should find.
+    """What the main job is given, and what it should find."""
 
-    Attributes:
-        scans: In random frames, under neutral names.
-        truth: world_from_scan of all that belong somewhere.
-        worlds: Number of each scan's world; a second object has one of its own.
-        sources: What each scan was made from, in words.
-        factors: Scale of the scans whose scale is wrong.
-        is_open: Scans whose pose nothing that they show determines: those of symmetric objects,
-            and those that do not see the one mark.
-        diameter: Of the object, or of what a crop left of it.
-        centroids: Of each scan, in its frame.
-    """
-
-    scans: list[RangeScan]
-    truth: dict[str, Pose]
-    worlds: dict[str, int]
-    sources: dict[str, str]
-    factors: dict[str, float]
+    scans: list[RangeScan]  # In random frames, under neutral names
+    truth: dict[str, Pose]  # world_from_scan of all that belong somewhere
+    worlds: dict[str, int]  # Number of each scan's world; a second object has one of its own
+    sources: dict[str, str]  # What each scan was made from, in words
+    factors: dict[str, float]  # Scale of the scans whose scale is wrong
+    # Scans whose pose nothing that they show determines: those of symmetric objects, and those that
+    # do not see the one mark
     is_open: frozenset[str]
-    diameter: float
-    centroids: dict[str, FloatArray]
+    diameter: float  # Of the object, or of what a crop left of it
+    centroids: dict[str, FloatArray]  # Of each scan, in its frame
 
 
 def make_scene(scenario: Scenario, seed: int) -> Scene:

@@ -33,21 +33,13 @@ Views = Callable[[Body, Rng], list[View]]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Shot:
-    """A scan in its sensor's frame.
+    """A scan in its sensor's frame."""
 
-    Attributes:
-        scan: With a grid and a camera, as long as nothing took them away.
-        world_from_sensor: Where the sensor stood; None if the scan belongs nowhere.
-        world: Number of the world: 0 for the object, another one for another object.
-        factor: By which the scan is too large.
-        sees_mark: Whether the scan shows what tells the object from a symmetric one.
-    """
-
-    scan: RangeScan
-    world_from_sensor: Pose | None
-    world: int = 0
-    factor: float = 1.0
-    sees_mark: bool = True
+    scan: RangeScan  # With a grid and a camera, as long as nothing took them away
+    world_from_sensor: Pose | None  # Where the sensor stood; None if the scan belongs nowhere
+    world: int = 0  # Number of the world: 0 for the object, another one for another object
+    factor: float = 1.0  # By which the scan is too large
+    sees_mark: bool = True  # Whether the scan shows what tells the object from a symmetric one
 
     @property
     def pose(self) -> Pose:
