@@ -23,6 +23,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.blocks import judged, markdown_table
+from benchmarks.kept import warn_of_old_calibration
 from benchmarks.results import Json, write_results
 from benchmarks.sets import QUICK, SETS, BenchmarkSet, data_folder, make_set
 from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
@@ -44,6 +45,7 @@ COLUMNS = (
 def main() -> int:
     """Run the sets; 0 if all floors are met, else 1."""
     options = _options()
+    warn_of_old_calibration()
     names, seeds = (list(QUICK), 1) if options.quick else (options.sets, options.seeds)
     runs: list[Json] = []
     for name in names:

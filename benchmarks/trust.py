@@ -11,7 +11,6 @@ on where it stopped. Change the code that measures and they are made again. 0 if
 """
 
 import argparse
-import logging
 import shutil
 import sys
 from dataclasses import replace
@@ -39,7 +38,6 @@ from scanweld.work.threads import num_workers
 def main() -> int:
     """Make runs, comparison and page; 0 if all floors are met or only the page was asked for."""
     options = _options()
-    logging.basicConfig(format="%(levelname)s: %(message)s")
     warn_of_old_calibration()
     if not options.pages:
         _measure(options)

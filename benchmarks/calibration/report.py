@@ -68,8 +68,12 @@ def calibration_told(found: Json) -> str:
     both = {"pairs": found["pair"], "scans": found["scan"]}
     told = (
         f"{how_measured(found)}: {found['sets']} sets of other objects than above, and none of "
-        "them in the part of the calibration that it is measured by.\n\n"
+        "them in the part of the calibration that it is measured by. "
     )
+    if "code" in found:
+        told += f"They are of code {found['code']}.\n\n"
+    else:
+        told += "Their code was not recorded: it is older than that of the runs above.\n\n"
     rows = [
         (name, each["count"], each["right"], *_cells(each, auc=4, error=3, brier=3))
         for name, each in both.items()
