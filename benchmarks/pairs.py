@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import describe
 from scanweld.io import read_poses, read_scan
-from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pipeline.robust import pair_registrar
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
@@ -100,8 +101,7 @@ class Scans:
     name: str
     scans: list[RangeScan]
     world_from_scan: Mapping[str, Pose]
-    # (i, j) -> overlap, and rotation in degrees between the two
-    pairs: Mapping[tuple[str, str], tuple[float, float]]
+    pairs: Mapping[tuple[str, str], tuple[float, float]]  # Overlap, and rotation in degrees
 
 
 def main() -> int:
@@ -157,26 +157,58 @@ def made_scans() -> Scans:
 
 def answers_of(scans: Scans, seed: int, anchors: str, workers: int) -> list[Answer]:
     """Register all pairs of an object, its scans moved as the seed says."""
+    found: list[Answer] = []
     with single_threaded_algebra():
-        moved, reference = moved_scans(
+        moved, truth = moved_scans(
             scans.scans, scans.world_from_scan, seed, any_rotation=True, turn_grids=True
         )
         prepared, register = _registrar(moved, anchors, workers)
-        scene = _Scene(
-            scans=scans,
-            prepared={scan.name: scan for scan in prepared},
-            register=register,
-            reference=reference,
-            diameter=object_diameter(moved, reference),
-        )
-        found: list[Answer] = []
-        answer = lambda edge: scene.answer(edge, seed, anchors)  # noqa: E731
+        diameter = object_diameter(moved, truth)
+
+        def answer(edge: tuple[str, str]) -> Answer:
+            at = [k for k, scan in enumerate(prepared) if scan.name in edge]
+            i, j = (prepared[k] for k in at)
+            start = time.perf_counter()
+            result = register((at[0], at[1]))
+            seconds = time.perf_counter() - start
+            true = truth[i.name].inverse() @ truth[j.name]
+            errors = [_error(i, j, each.i_from_j, true, diameter) for each in result.alternatives]
+            overlap, gap_deg = scans.pairs[edge]
+            how = {"anchors": anchors, "object": scans.name, "seed": seed, "seconds": seconds}
+            pair = {"i": i.name, "j": j.name, "overlap": overlap, "gap_deg": gap_deg}
+            return Answer(**how, **pair, **_told(result, errors))
+
         for each in map_in_order(answer, list(scans.pairs), workers):
             found.append(each)
             told = f"{anchors}, {scans.name} seed {seed}: {len(found)}/{len(scans.pairs)}"
             print(f"\r{told}", end="", file=sys.stderr)
-        print(file=sys.stderr)
+    print(file=sys.stderr)
     return found
+
+
+def _error(
+    i: PreparedScan, j: PreparedScan, i_from_j: Pose, true: Pose, diameter: float
+) -> tuple[float, float]:
+    """Rotation in degrees, and translation at j's centroid in percent of the diameter."""
+    off = true.inverse() @ i.scan_from_sensor @ i_from_j @ j.scan_from_sensor.inverse()
+    return off.angle_deg(), 100.0 * off.shift_at(j.scan.points.mean(axis=0)) / diameter
+
+
+def _told(result: PairResult, errors: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    """What a pair's result says, and the errors of its answers."""
+    limits = MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT
+    right = [k for k, (r, t) in enumerate(errors, 1) if r <= limits[0] and t <= limits[1]]
+    rotation, translation = errors[0] if errors else (None, None)
+    return {
+        "kind": str(result.kind),
+        "rotation_deg": rotation,
+        "translation_percent": translation,
+        "score": result.best.score if result.best else None,
+        "evidence": asdict(result.best.evidence) if result.best else {},
+        "margin": result.margin,
+        "observability": result.observability,
+        "rank": right[0] if right else None,
+    }
 
 
 def _registrar(
@@ -192,56 +224,6 @@ def _registrar(
         features = list(map_in_order(lambda scan: describe(scan, config.heat), prepared, workers))
     contours = contour_matcher(prepared, config.contours)
     return prepared, pair_registrar(prepared, features, fields, contours, diameter, config)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Scene:
-    """The scans of an object, moved and laid out, with their reference poses."""
-
-    scans: Scans
-    prepared: dict[str, PreparedScan]
-    register: Callable[[tuple[int, int]], PairResult]
-    reference: Mapping[str, Pose]
-    diameter: float
-
-    def errors(self, i: str, j: str, alternative: Alternative) -> tuple[float, float]:
-        """Rotation in degrees, and translation at j's centroid in percent of the diameter."""
-        scan_i, scan_j = self.prepared[i], self.prepared[j]
-        found = scan_i.scan_from_sensor @ alternative.i_from_j @ scan_j.scan_from_sensor.inverse()
-        off = (self.reference[i].inverse() @ self.reference[j]).inverse() @ found
-        shift = off.shift_at(scan_j.scan.points.mean(axis=0))
-        return off.angle_deg(), 100.0 * shift / self.diameter
-
-    def answer(self, edge: tuple[str, str], seed: int, anchors: str) -> Answer:
-        names = list(self.prepared)
-        first, second = sorted(map(names.index, edge))
-        i, j = names[first], names[second]
-        start = time.perf_counter()
-        result = self.register((first, second))
-        seconds = time.perf_counter() - start
-        errors = [self.errors(i, j, alternative) for alternative in result.alternatives]
-        limits = MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT
-        right = [k for k, (r, t) in enumerate(errors, 1) if r <= limits[0] and t <= limits[1]]
-        rotation, translation = errors[0] if errors else (None, None)
-        overlap, gap_deg = self.scans.pairs[edge]
-        return Answer(
-            anchors=anchors,
-            object=self.scans.name,
-            seed=seed,
-            i=i,
-            j=j,
-            overlap=overlap,
-            gap_deg=gap_deg,
-            kind=str(result.kind),
-            rotation_deg=rotation,
-            translation_percent=translation,
-            score=result.best.score if result.best else None,
-            evidence=asdict(result.best.evidence) if result.best else {},
-            margin=result.margin,
-            observability=result.observability,
-            rank=right[0] if right else None,
-            seconds=seconds,
-        )
 
 
 def table(answers: Sequence[Answer]) -> str:
