@@ -42,8 +42,8 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import describe
 from scanweld.io import read_poses, read_scan
+from scanweld.pairs.registrar import pair_registrar
 from scanweld.pairs.result import PairKind, PairResult
-from scanweld.pipeline.robust import pair_registrar
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
 

@@ -12,7 +12,8 @@ import pytest
 from benchmarks.blocks import BLOCK
 from benchmarks.paper import ablations, method_reasons
 from benchmarks.paper.method_numbers import NUMBERS
-from benchmarks.paper.method_page import PLACE, TEMPLATE, Results, constant, method_text
+from benchmarks.paper.method_page import PLACE, TEMPLATE, constant, method_text
+from benchmarks.paper.method_results import Results
 from benchmarks.paper.pages import write_page
 from benchmarks.paper.study import Study, read_records
 from benchmarks.paper.tables import table, table_names

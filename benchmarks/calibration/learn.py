@@ -47,7 +47,12 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         cap_undecided(p, _as_told(pair), pair["grounds"], CONFIG) for p, pair in probabilities
     ]
     scans = _scan_examples(records, confidences)
-    held = zip(held_out_probabilities(scans).tolist(), scans.rows(), strict=True)
+    held = [
+        cap_by_links(probability, row, CONFIG)
+        for probability, row in zip(
+            held_out_probabilities(scans).tolist(), scans.rows(), strict=True
+        )
+    ]
     digest = hashlib.sha256(json.dumps([record.result for record in records]).encode())
     made = {
         "command": command,
@@ -62,9 +67,7 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         pairs=pairs,
         scans=scans,
         stated_pairs=Stated(np.array(confidences), pairs.is_right),
-        stated_scans=Stated(
-            np.array([cap_by_links(p, row, CONFIG) for p, row in held]), scans.is_right
-        ),
+        stated_scans=Stated(np.array(held), scans.is_right),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.paper import basins
 from benchmarks.paper.ablations import coarse, contours, heat, search, terms
-from benchmarks.paper.method_page import Results
+from benchmarks.paper.method_results import Results
 from benchmarks.paper.pages import percent
 from benchmarks.paper.study import Record
 from benchmarks.paper.success import Limit

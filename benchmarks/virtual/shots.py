@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from benchmarks.virtual.bodies import Body, middle
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
-from scanweld.evaluation.views import View, view_of
+from scanweld.evaluation.views import View, camera_axes, view_along, view_of
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -92,11 +92,13 @@ def ring(
     step = 360.0 / count if step_deg is None else step_deg
     jitter = rng.uniform(-JITTER_DEG, JITTER_DEG, size=(count, 2))
     return [
-        view_of(
+        view_along(
             body.mesh,
-            step * k + jitter[k, 0],
-            elevations_deg[k % len(elevations_deg)] + jitter[k, 1],
-            rng.uniform(-180, 180),
+            camera_axes(
+                step * k + jitter[k, 0],
+                elevations_deg[k % len(elevations_deg)] + jitter[k, 1],
+                rng.uniform(-180, 180),
+            ),
             pixels=pixels[k % len(pixels)],
             **lens,  # type: ignore[arg-type]  # model and distance_diameters
         )

@@ -111,15 +111,15 @@ def measure(unit: Unit) -> Result:
     scene = _real_scene(unit) if "i" in unit else _virtual_scene(unit)
     scans, config = (scene.pair.i, scene.pair.j), Config()
     features = [describe(scan, config.heat) for scan in scans]
-    fields = [make_field(scan, scene.pair.diameter) for scan in scans]
+    fields = [make_field(scan) for scan in scans]
     matcher = contour_matcher(scans, config.contours)
     number = max(MIN_ANCHORS, round(sum(map(len, features)) / 2))
     answers: dict[str, list[dict[str, Any]]] = {}
     for kind in ("heat", "even", "mixed"):
         pairs = _anchored(kind, number)
         settings = config.model_copy(update={"pairs": pairs})
-        register = pair_registrar(scans, features, fields, matcher, scene.pair.diameter, settings)
-        answers[kind] = _kept(scene, register((0, 1)))
+        registrar = pair_registrar(scans, features, fields, matcher, settings)
+        answers[kind] = _kept(scene, registrar.register((0, 1)))
     return {
         "anchors": number,
         "heat": answers["heat"][:1],

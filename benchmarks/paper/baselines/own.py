@@ -68,15 +68,14 @@ def paper(pair: ScanPair, start: Pose, seed: int) -> Answer:
 def default(pair: ScanPair, start: Pose, seed: int) -> Answer:
     """What a run does for a pair, features and all; its score is that of the best pose found."""
     config, scans = Config(), (pair.i, pair.j)
-    register = pair_registrar(
+    registrar = pair_registrar(
         scans,
         [describe(scan, config.heat) for scan in scans],
-        [make_field(scan, pair.diameter) for scan in scans],
+        [make_field(scan) for scan in scans],
         contour_matcher(scans, config.contours),
-        pair.diameter,
         config,
     )
-    result = register((0, 1))
+    result = registrar.register((0, 1))
     best = result.best
     return Answer(
         i_from_j=best.i_from_j if best else None,

@@ -50,7 +50,7 @@ def run(
         unreadable: Name -> reason of scans that could not even be read, for the report.
         workers: Threads over scans and pairs; as many as there are cores if not given.
         cache: Keeps finished work, so that an interrupted run goes on where it stopped.
-        progress: PixelConsensus of stages, their finished items, and scans that are refused.
+        progress: Told of stages, their finished items, and scans that are refused.
 
     Returns:
         The poses of the scans that could be placed, the mesh, and the report. Scans that could
