@@ -328,7 +328,9 @@ def test_simulate_then_evaluate(capsys: pytest.CaptureFixture[str]):
     assert scanweld("simulate", "box.ply", "-o", "sim", *options) == 1
 
 
-def test_evaluate_finds_what_is_wrong(capsys: pytest.CaptureFixture[str]):
+def test_evaluate_finds_what_is_wrong_and_needs_every_placed_scan(
+    capsys: pytest.CaptureFixture[str], scans: Path
+):
     truth = {name: turned(k) for k, name in enumerate(("a", "b", "c"))}
     off = Pose.exp([0, 0, np.radians(10), 0, 0, 0])
     found = {"a": truth["a"], "b": truth["b"] @ off}
@@ -342,12 +344,9 @@ def test_evaluate_finds_what_is_wrong(capsys: pytest.CaptureFixture[str]):
     assert "of 3 scans: 1 right, 1 wrong, 1 unplaced" in out and "/ 10.000 deg" in out
     assert scanweld("evaluate", "poses.json", "missing.json") == 1
     assert "missing.json" in error_line(capsys)
-
-
-def test_evaluate_needs_every_placed_scan(scans: Path, capsys: pytest.CaptureFixture[str]):
     poses = a_result(["a", "elsewhere"]).poses
-    write_poses("poses.json", PoseSet(poses=dict(poses), components=(tuple(poses),)))
-    assert scanweld("evaluate", "poses.json", "poses.json", "--scans", scans) == 1
+    write_poses("more.json", PoseSet(poses=dict(poses), components=(tuple(poses),)))
+    assert scanweld("evaluate", "more.json", "more.json", "--scans", scans) == 1
     assert "elsewhere" in error_line(capsys)
 
 

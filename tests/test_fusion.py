@@ -167,17 +167,13 @@ def test_thin_walls_keep_both_sides():
     assert (mesh.vertices[inner, 2] > 0).any() and (mesh.vertices[inner, 2] < 0).any()
 
 
-def test_dropouts_do_not_eat_what_another_scan_saw():
+def test_what_one_scan_lost_does_not_eat_what_another_saw():
     views = views_of(sphere(RADIUS), SIX_SIDES)
     whole, poses = sphere_scans()
     holed, _ = scanned(sphere(RADIUS), views, NoiseModel(dropout=0.3))
     mesh = fuse([*whole, *holed], [*poses, *poses], CONFIG)
     assert is_closed(mesh.faces)
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.5 * voxel_of(whole)
-
-
-def test_a_scan_that_lost_half_of_the_object_does_not_carve_it():
-    """Its sensor saw nothing of one half, which looks like free space; the other scans know."""
     scans, poses = sphere_scans()
     view = views_of(sphere(RADIUS), SIX_SIDES)[0]
     seen = scan_mesh(sphere(RADIUS), view.camera, view.world_from_sensor)

@@ -53,8 +53,10 @@ def refused(events: Sequence[Event]) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_stages_start_advance_and_finish_in_turn(told_run: tuple[list[Event], Reconstruction]):
-    events, _ = told_run
+def test_stages_start_and_finish_in_turn_and_scans_are_refused_as_it_happens(
+    told_run: tuple[list[Event], Reconstruction],
+):
+    events, result = told_run
     current, done, finished = "", 0, []
     for event in events:
         match event:
@@ -74,11 +76,6 @@ def test_stages_start_advance_and_finish_in_turn(told_run: tuple[list[Event], Re
     assert tuple(finished) == stages
     pairs = next(e for e in events if isinstance(e, StageFinished) and e.stage == "pairs")
     assert pairs.counts == {"pairs": 6}
-
-
-@pytest.mark.slow
-def test_scans_are_refused_once_and_as_it_happens(told_run: tuple[list[Event], Reconstruction]):
-    events, result = told_run
     told = refused(events)
     assert told == dict(result.unplaced) and {"large", "twice"} <= set(told)
     assert sum(isinstance(event, ScanRefused) for event in events) == len(told)

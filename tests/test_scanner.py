@@ -88,7 +88,7 @@ def _ray_through(
     return t[(u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)]
 
 
-def test_the_scan_frame_moves_the_points_and_nothing_else():
+def test_the_scan_frame_moves_the_points_alone_and_a_seed_gives_the_same_bytes():
     mesh = small_creature()
     view = view_of(mesh, 30, 10, pixels=60)
     motion = random_motion(np.random.default_rng(0), 100.0)
@@ -97,10 +97,6 @@ def test_the_scan_frame_moves_the_points_and_nothing_else():
     assert moved.viewpoint is Viewpoint.GIVEN
     np.testing.assert_array_equal(moved.grid, plain.grid)
     np.testing.assert_allclose(moved.points, motion.apply(plain.points), atol=1e-9)
-
-
-def test_same_seed_same_bytes():
-    mesh = small_creature()
     view = view_of(mesh, 0, pixels=80)
     noise = NoiseModel(depth_diameters=1e-3, dropout=0.1, grazing_dropout=0.5)
     first, again, other = (
