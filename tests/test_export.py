@@ -125,13 +125,13 @@ def test_colmap_opens_the_model_and_sees_points_where_the_sensors_did(model: Pat
 
 def test_files_are_named_as_seen_from_the_poses(model: Path, monkeypatch: pytest.MonkeyPatch):
     assert scanweld("export", model, "--poses", "aln", "-o", "far/away/out") == 0
-    lines = Path("far/away/out/poses.aln").read_text().splitlines()
+    lines = Path("far/away/out/poses.aln").read_text(encoding="utf-8").splitlines()
     assert lines[1] == "../../../scans/scan_01.ply"
     assert (Path("far/away/out") / lines[1]).is_file()
     monkeypatch.setattr(job.pipeline, "run", stub_run)
     assert scanweld("run", "scans", "-o", "there/result") == 0
     assert scanweld("export", "there/result", "--poses", "mlp", "-o", "there/out") == 0
-    assert "../../scans/scan_01.ply" in Path("there/out/poses.mlp").read_text()
+    assert "../../scans/scan_01.ply" in Path("there/out/poses.mlp").read_text(encoding="utf-8")
 
 
 def test_points_lie_together_and_know_their_scan_and_its_colours(
@@ -319,7 +319,10 @@ def test_known_poses_are_fused_in_their_frame(
     assert scanweld("report", "fused") == 0
     assert Path("fused/report.html").read_text(encoding="utf-8") == page
     assert scanweld("export", "fused", "--poses", "conf", "--model", "glb", "-o", "again") == 0
-    assert Path("again/poses.conf").read_text() and "note" not in capsys.readouterr().out
+    assert (
+        Path("again/poses.conf").read_text(encoding="utf-8")
+        and "note" not in capsys.readouterr().out
+    )
 
 
 def assert_true(scene: Scene, file: Path) -> None:

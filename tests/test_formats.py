@@ -19,7 +19,7 @@ FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
 def put(path: Path, text: str) -> Path:
-    path.write_text(text)
+    path.write_bytes(text.encode("utf-8"))
     return path
 
 

@@ -73,8 +73,8 @@ def test_page_is_well_formed_and_needs_nothing_else(made: Made, page: Page):
 
 
 def test_numbers_are_those_of_the_files(made: Made, page: Page):
-    report = json.loads((made.folder / "report.json").read_text())
-    graph = json.loads((made.folder / "graph.json").read_text())
+    report = json.loads((made.folder / "report.json").read_text(encoding="utf-8"))
+    graph = json.loads((made.folder / "graph.json").read_text(encoding="utf-8"))
     for name, scan in report["scans"].items():
         wanted = {repr(scan["overlap"]), repr(scan["rms"]), str(scan["num_points"])}
         assert wanted <= page.values(), name
@@ -274,7 +274,7 @@ def test_what_was_known_and_what_a_pair_slides_like_are_shown(tmp_path: Path):
 def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
     folder = written(tmp_path, good_result(small_scene()))
     for name, key in (("report.json", "scans"), ("graph.json", "pairs")):
-        content = json.loads((folder / name).read_text())
+        content = json.loads((folder / name).read_text(encoding="utf-8"))
         entries = content[key].values() if key == "scans" else content[key]
         for entry in entries:
             entry["confidence"] = 0.98765

@@ -193,7 +193,7 @@ def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     config = Config(fusion=FusionConfig(max_voxels_across=60))
     monkeypatch.setattr(job, "points_within", lambda budget, paths: 1200)
     run_job([folder], tmp_path / "model", config, memory=10_000 * MEGABYTE, workers=1)
-    told = json.loads((tmp_path / "model" / "report.json").read_text())["scans"]
+    told = json.loads((tmp_path / "model" / "report.json").read_text(encoding="utf-8"))["scans"]
     assert told["large"]["num_points"] <= 1200
     assert any("thinned from" in note for note in told["large"]["notes"])
     assert not any("thinned" in note for note in told["scan_01"]["notes"])

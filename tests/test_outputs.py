@@ -41,7 +41,10 @@ def test_all_files_are_there_and_strict(tmp_path: Path, result: Reconstruction):
     assert {path.name for path in tmp_path.iterdir()} == names
     for name in ("poses.json", "graph.json", "report.json"):
         assert load(tmp_path / name)["format"] == 1
-    assert Config(**tomllib.loads((tmp_path / "config.toml").read_text())) == result.config
+    assert (
+        Config(**tomllib.loads((tmp_path / "config.toml").read_text(encoding="utf-8")))
+        == result.config
+    )
     assert np.array_equal(read_mesh(tmp_path / "model.ply").vertices, np.eye(3))
 
 

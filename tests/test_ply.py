@@ -24,7 +24,7 @@ GRID = "property list uchar int vertex_indices\n"
 
 
 def ascii_ply(path: Path, header: str, body: str) -> Path:
-    path.write_text(f"ply\nformat ascii 1.0\n{header}end_header\n{body}")
+    path.write_bytes(f"ply\nformat ascii 1.0\n{header}end_header\n{body}".encode())
     return path
 
 

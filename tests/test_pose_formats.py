@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -154,9 +155,10 @@ def test_a_point_seen_lands_in_the_same_pixel_in_colmap_and_nerfstudio(
     assert np.allclose([u, v], pixel)
 
 
+NOT_IN_FILES = '/\\<>:"|?*.' if sys.platform == "win32" else "/\\"
 NAMES = st.text(
     st.characters(
-        categories=["L", "N", "P", "S"], include_characters=" ", exclude_characters="/\\"
+        categories=["L", "N", "P", "S"], include_characters=" ", exclude_characters=NOT_IN_FILES
     ),
     min_size=1,
     max_size=12,

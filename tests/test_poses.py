@@ -143,7 +143,7 @@ def test_components_name_every_placed_scan_once(components: tuple[tuple[str, ...
 @pytest.mark.parametrize("name", ["poses.json", "poses_conf.json"])
 def test_reference_poses_keep_their_digits(folder: str, name: str) -> None:
     path = require_data(f"{folder}/{name}")
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text(encoding="utf-8"))
     poses = read_poses(path).poses
     assert poses.keys() == content.keys()
     for key, rows in content.items():

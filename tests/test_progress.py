@@ -108,7 +108,7 @@ def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     lines: Told = [json.loads(line) for line in out.splitlines()]
     assert err == "" and lines[0] == {"event": "stage_started", "stage": "read"}
     end = lines.pop()
-    report = json.loads(Path("model/report.json").read_text())
+    report = json.loads(Path("model/report.json").read_text(encoding="utf-8"))
     assert end["event"] == "finished" and end["exit_code"] == code == 3
     assert all(end[key] == report[key] for key in ("verdict", "exit_code", "reasons"))
     assert (end["scans"], end["output"]) == (3, "model")
