@@ -50,18 +50,6 @@ def test_unproject_undoes_project(drawn: tuple[Camera, FloatArray]):
     np.testing.assert_allclose(camera.unproject(pixels, depth), points, atol=1e-5, rtol=1e-6)
 
 
-@given(
-    st.sampled_from(MODELS),
-    arrays(np.float64, (6, 2), elements=st.floats(-50.0, 50.0)),
-    arrays(np.float64, 6, elements=st.floats(0.5, 100.0)),
-)
-def test_project_undoes_unproject(model: CameraModel, pixels: FloatArray, depth: FloatArray):
-    camera = camera_of(model)
-    found, found_depth = camera.project(camera.unproject(pixels, depth))
-    np.testing.assert_allclose(found, pixels, atol=1e-9)
-    np.testing.assert_allclose(found_depth, depth, rtol=1e-12)
-
-
 @pytest.mark.parametrize("model", MODELS)
 def test_an_image_unprojects_pixel_by_pixel(model: CameraModel):
     camera = camera_of(model)

@@ -261,13 +261,24 @@ def test_file_names_that_are_no_utf8_are_spelled_out(scans: Path):
     assert "\\xfe.ply: not a PLY" in poses["unplaced"]["\\xfe"]
 
 
-def test_force_replaces_and_its_absence_refuses(scans: Path):
+def test_force_replaces_and_failing_runs_leave_an_earlier_output_whole(
+    scans: Path, monkeypatch: pytest.MonkeyPatch
+):
     assert scanweld("run", scans, "-o", "model") == 0
     Path("model/old").write_text("old")
     assert scanweld("run", scans, "-o", "model") == 1
     assert Path("model/old").exists()
     assert scanweld("run", scans, "-o", "model", "--force") == 0
     assert not Path("model/old").exists()
+    before = {path.name: path.read_bytes() for path in Path("model").iterdir()}
+    for error, code in ((InputError("too little"), 1), (KeyboardInterrupt(), 130)):
+        fail_with(error, monkeypatch)
+        assert scanweld("run", scans, "-o", "model", "--force") == code
+        assert {path.name: path.read_bytes() for path in Path("model").iterdir()} == before
+    fail_with(ZeroDivisionError("a bug"), monkeypatch)
+    with pytest.raises(ZeroDivisionError):
+        main(["run", str(scans), "-o", "other"])
+    assert not Path("other").exists()
 
 
 def test_interruption_exits_with_130_and_a_rerun_continues(
@@ -282,22 +293,6 @@ def test_interruption_exits_with_130_and_a_rerun_continues(
     monkeypatch.setattr(job.pipeline, "run", stub_run)
     assert scanweld("run", scans, "-o", "model") == 0
     assert not work_folder(Path("model")).exists()
-
-
-def test_failing_run_leaves_an_earlier_output_whole(scans: Path, monkeypatch: pytest.MonkeyPatch):
-    assert scanweld("run", scans, "-o", "model") == 0
-    before = {path.name: path.read_bytes() for path in Path("model").iterdir()}
-    for error, code in ((InputError("too little"), 1), (KeyboardInterrupt(), 130)):
-        fail_with(error, monkeypatch)
-        assert scanweld("run", scans, "-o", "model", "--force") == code
-        assert {path.name: path.read_bytes() for path in Path("model").iterdir()} == before
-
-
-def test_crash_is_no_success(scans: Path, monkeypatch: pytest.MonkeyPatch):
-    fail_with(ZeroDivisionError("a bug"), monkeypatch)
-    with pytest.raises(ZeroDivisionError):
-        main(["run", str(scans), "-o", "model"])
-    assert not Path("model").exists()
 
 
 def test_info_shows_what_was_read_and_names_the_broken_file(

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as nps
 
@@ -34,9 +34,7 @@ def off_text(vertices: np.ndarray, faces: np.ndarray) -> str:
     return "\n".join(lines + [f"3 {' '.join(map(str, f))}" for f in faces.tolist()])
 
 
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40)
 @given(
     vertices=nps.arrays(np.float64, (5, 3), elements=st.floats(-1e9, 1e9)),
     faces=nps.arrays(np.int64, (4, 3), elements=st.integers(0, 4)),
@@ -207,9 +205,7 @@ SEEDS = {
 
 
 @pytest.mark.filterwarnings("error")
-@settings(
-    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=300)
 @given(
     name=st.sampled_from(sorted(SEEDS)),
     edits=st.lists(

@@ -143,7 +143,7 @@ def test_residuals_are_of_the_scans_that_the_model_was_made_of(tmp_path: Path, w
     assert any(f"The fused surface of {len(shown)} scans" in words for words in page.words)
 
 
-def test_residual_and_support_of_a_ball_measured_too_large():
+def test_residual_support_and_holes_of_a_ball():
     ball = sphere(50.0)
     outside = ball.vertices * 1.01
     upper = outside[outside[:, 2] > 0]
@@ -158,10 +158,6 @@ def test_residual_and_support_of_a_ball_measured_too_large():
     assert np.allclose(check.residual, 0.5, atol=1e-3)
     far = check_surface(ball, {"far": ball.vertices * 3})
     assert far.off_model == 1 and not len(far.all_distances()) and np.isnan(far.residual).all()
-
-
-def test_a_hole_is_found_and_measured():
-    ball = sphere(50.0)
     kept = (ball.vertices[ball.faces][..., 2] < 40).all(axis=1)
     cut = TriangleMesh(vertices=ball.vertices, faces=ball.faces[kept])
     borders = open_borders(cut)
@@ -231,7 +227,7 @@ def test_nothing_placed_or_one_scan_and_pairs_without_numbers(tmp_path: Path):
     assert "1 of 2 scans are placed." in page_of(tmp_path).words
 
 
-def test_sixty_scans(tmp_path: Path):
+def test_sixty_scans_and_several_components(tmp_path: Path):
     names = [f"turn_{k:02d}" for k in range(60)]
     folder = crowd(tmp_path, names)
     write_html_report(folder)
@@ -239,9 +235,6 @@ def test_sixty_scans(tmp_path: Path):
     cells = [found for tag, found in page.elements if tag == "td" and "data-pair" in found]
     assert len(cells) == 60 * 59 and all(found["title"] for found in cells)
     assert (folder / "report.html").stat().st_size < 4e6
-
-
-def test_several_components_are_told_apart(tmp_path: Path):
     result = dataclasses.replace(
         a_result(["a", "b", "c", "d"]), components=(("a", "b"), ("d", "c"))
     )

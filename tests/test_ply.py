@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as nps
 
@@ -269,9 +269,7 @@ def scans(draw: st.DrawFn) -> RangeScan:
     )
 
 
-@settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=150)
 @given(scan=scans())
 def test_a_written_scan_is_read_back_exactly(scan: RangeScan, tmp_path: Path) -> None:
     path = tmp_path / "scan.ply"

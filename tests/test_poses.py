@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scanweld.errors import ReadError
@@ -28,9 +28,6 @@ def assert_same(a: PoseSet, b: PoseSet) -> None:
         np.testing.assert_array_equal(pose.matrix(), b.poses[name].matrix())
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
 @given(
     names=st.lists(st.text(st.characters(codec="utf-8"), max_size=8), unique=True, max_size=8),
     cuts=st.tuples(st.integers(0, 8), st.integers(0, 8)),
