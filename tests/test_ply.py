@@ -166,8 +166,10 @@ def test_broken_files_are_refused_in_one_line(name: str, says: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+CAMERA = "obj_info scanweld_camera"
 MIRROR = "1 0 0 0 0 1 0 0 0 0 -1 0 0 0 0 1"
 GRID_OF_TWO = f"obj_info num_cols 2\nobj_info num_rows 1\nelement vertex 1\n{XYZ}"
+TWO_CELLS = f"{GRID_OF_TWO}element range_grid 2\n{GRID}"
 
 
 @pytest.mark.parametrize(
@@ -182,28 +184,19 @@ GRID_OF_TWO = f"obj_info num_cols 2\nobj_info num_rows 1\nelement vertex 1\n{XYZ
         ("element vertex 1\nproperty float x\n", "0\n", "lack x, y or z"),
         ("element vertex -1\n", "", "not 'element NAME COUNT'"),
         ("element vertex 1\nproperty floatt x\n", "0\n", "not a property of a known type"),
-        (f"{GRID_OF_TWO}element range_grid 2\n{GRID}", "0 0 0\n1 0\n1 1\n", "name point 1, but"),
-        (f"{GRID_OF_TWO}element range_grid 2\n{GRID}", "0 0 0\n1 0\n2 0 0\n", "several points"),
+        (TWO_CELLS, "0 0 0\n1 0\n1 1\n", "name point 1, but"),
+        (TWO_CELLS, "0 0 0\n1 0\n2 0 0\n", "several points"),
         (f"{GRID_OF_TWO}element range_grid 3\n{GRID}", "0 0 0\n1 0\n0\n0\n", "has 3 cells"),
-        (f"{GRID_OF_TWO}element range_grid 2\n{GRID}", "0 0 0\n1 0\n0.5\n", "whole number"),
-        (f"{GRID_OF_TWO}element range_grid 2\n{GRID}", "0 0 0\n1 0\n-1\n", "whole number"),
-        (f"{GRID_OF_TWO}element range_grid 2\n{GRID}", "0 0 0\n1 0.5\n0\n", "whole number"),
-        (f"{GRID_OF_TWO}element range_grid 2\n{GRID}", "0 0 0\n1 0\n1e300\n", "ends too early"),
+        (TWO_CELLS, "0 0 0\n1 0\n0.5\n", "whole number"),
+        (TWO_CELLS, "0 0 0\n1 0\n-1\n", "whole number"),
+        (TWO_CELLS, "0 0 0\n1 0.5\n0\n", "whole number"),
+        (TWO_CELLS, "0 0 0\n1 0\n1e300\n", "ends too early"),
         (f"{GRID_OF_TWO}element face 1\n{GRID}", "0 0 0\n3 0 -2 0\n", "name point -2"),
-        (
-            f"{GRID_OF_TWO}obj_info scanweld_camera fisheye 1 1 1 1 0 0\n",
-            "0 0 0\n",
-            "is not a model",
-        ),
-        (f"{GRID_OF_TWO}obj_info scanweld_camera\n", "0 0 0\n", "is not a model"),
+        (f"{GRID_OF_TWO}{CAMERA} fisheye 1 1 1 1 0 0\n", "0 0 0\n", "is not a model"),
+        (f"{GRID_OF_TWO}{CAMERA}\n", "0 0 0\n", "is not a model"),
         (f"{GRID_OF_TWO}obj_info scanweld_scan_from_sensor 1 2 3\n", "0 0 0\n", "instead of 16"),
         (f"obj_info scanweld_scan_from_sensor {MIRROR}\n{GRID_OF_TWO}", "0 0 0\n", "not a rigid"),
-        (
-            "obj_info scanweld_camera pinhole 2 2 1 1 0 0\n"
-            f"{GRID_OF_TWO}element range_grid 2\n{GRID}",
-            "0 0 0\n1 0\n0\n",
-            "2 x 2 pixels",
-        ),
+        (f"{CAMERA} pinhole 2 2 1 1 0 0\n{TWO_CELLS}", "0 0 0\n1 0\n0\n", "2 x 2 pixels"),
     ],
 )
 def test_contradictions_are_refused(tmp_path: Path, header: str, body: str, says: str) -> None:

@@ -106,21 +106,6 @@ def test_files_by_hand_are_read_as_their_definition_says(tmp_path: Path, name: s
     assert np.abs(poses["one"].matrix() - QUARTER.matrix()).max() < 1e-12
 
 
-def test_what_is_written_is_what_the_definitions_say(tmp_path: Path):
-    scan = scan_at("one", QUARTER)
-    texts = {key: text for form in FORMATS.values() for key, text in form.write([scan]).items()}
-    words = texts["poses.conf"].splitlines()[1].split()
-    assert words[:2] == ["bmesh", "../scans/one.ply"]
-    assert np.allclose([float(w) for w in words[2:]], [1, 2, 3, 0, 0, -HALF, HALF])
-    exact = "0.0 -1.0 0.0 1.0\n1.0 0.0 0.0 2.0\n0.0 0.0 1.0 3.0\n0.0 0.0 0.0 1.0\n"
-    assert texts["cloudcompare/one.txt"] == exact
-    assert texts["poses.aln"] == f"1\n../scans/one.ply\n#\n{exact}0\n"
-    assert f"<MLMatrix44>\n{exact}</MLMatrix44>" in texts["poses.mlp"]
-    assert json.loads(texts["posegraph.json"])["nodes"][0]["pose"] == COLUMNS
-    row = next(line for line in texts["poses.tum.txt"].splitlines() if line[0] != "#")
-    assert np.allclose([float(w) for w in row.split()], [0, 1, 2, 3, 0, 0, HALF, HALF])
-
-
 def test_intrinsics_have_pixel_centres_at_one_half():
     texts = FORMATS["colmap"].write([scan_at("one", QUARTER)])
     line = texts["colmap/cameras.txt"].splitlines()[1]

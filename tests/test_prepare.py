@@ -30,7 +30,7 @@ from tests.depth_scans import (
     scan_of_depth,
 )
 from tests.prepared import creature_pair, moved, scaled
-from tests.scenes import pair_at_gap, random_motion
+from tests.scenes import random_motion
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -249,10 +249,6 @@ def test_the_content_hash_knows_content_not_name():
     points[0, 0] = np.nextafter(points[0, 0], np.inf)
     assert prepare(replace(scan, name="other"), CONFIG).content_hash == scan.content_hash()
     assert replace(scan, points=points).content_hash() != scan.content_hash()
-    scan = pair_at_gap(30, pixels=100)[0]
-    a, b = prepare(scan, CONFIG), prepare(scan, CONFIG)
-    assert a.samples.points.tobytes() == b.samples.points.tobytes()
-    assert a.image.normals.tobytes() == b.image.normals.tobytes()
 
 
 def test_a_scan_with_hardly_any_surface_or_points_is_refused():
