@@ -3,14 +3,21 @@
 import os
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # Baselines of libraries repeat themselves on one thread only, and read this when they are loaded;
 # and with one process a core, more threads would be in each other's way.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# The same examples in every run; a first call may compile, so no deadline.
-settings.register_profile("scanweld", deadline=None, max_examples=60, derandomize=True)
+# The same examples in every run; a first call may compile, so no deadline. The folder of a test is
+# shared by its examples, each of which writes over what was there.
+settings.register_profile(
+    "scanweld",
+    deadline=None,
+    max_examples=60,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 settings.load_profile("scanweld")
 
 

@@ -50,18 +50,6 @@ def test_unproject_undoes_project(drawn: tuple[Camera, FloatArray]):
     np.testing.assert_allclose(camera.unproject(pixels, depth), points, atol=1e-5, rtol=1e-6)
 
 
-@given(
-    st.sampled_from(MODELS),
-    arrays(np.float64, (6, 2), elements=st.floats(-50.0, 50.0)),
-    arrays(np.float64, 6, elements=st.floats(0.5, 100.0)),
-)
-def test_project_undoes_unproject(model: CameraModel, pixels: FloatArray, depth: FloatArray):
-    camera = camera_of(model)
-    found, found_depth = camera.project(camera.unproject(pixels, depth))
-    np.testing.assert_allclose(found, pixels, atol=1e-9)
-    np.testing.assert_allclose(found_depth, depth, rtol=1e-12)
-
-
 @pytest.mark.parametrize("model", MODELS)
 def test_an_image_unprojects_pixel_by_pixel(model: CameraModel):
     camera = camera_of(model)
@@ -87,7 +75,7 @@ def test_axes_point_right_down_and_away(model: CameraModel):
     assert (depth >= 4).all()
 
 
-def test_the_formulas_of_the_three_models():
+def test_the_formulas_of_the_three_models_before_and_behind():
     point = np.array([[3.0, 4.0, 12.0]])
     pixels, depth = camera_of(CameraModel.PINHOLE).project(point)
     np.testing.assert_allclose(pixels, [[50 * 3 / 12 + 17.25, 60 * 4 / 12 + 14.5]])
@@ -99,14 +87,8 @@ def test_the_formulas_of_the_three_models():
     elevation = np.arctan2(4, np.hypot(3, 12))
     np.testing.assert_allclose(pixels, [[50 * np.arctan2(3, 12) + 17.25, 60 * elevation + 14.5]])
     assert depth == pytest.approx(13)
-
-
-def test_a_pinhole_does_not_see_behind_itself():
     pixels, _ = camera_of(CameraModel.PINHOLE).project(np.array([[0, 0, -1.0], [1, 1, 0.0]]))
     assert np.isnan(pixels).all()
-
-
-def test_a_spherical_camera_sees_behind_itself():
     pixels, depth = camera_of(CameraModel.SPHERICAL).project(np.array([[0.0, 0, -2]]))
     np.testing.assert_allclose(pixels, [[50 * np.pi + 17.25, 14.5]])
     assert depth == pytest.approx(2)

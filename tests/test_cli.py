@@ -63,7 +63,7 @@ def scans(scan_file: Path, tmp_path: Path) -> Path:
 
 def report() -> Any:
     """The report of the output that tests write most."""
-    return json.loads(Path("model/report.json").read_text())
+    return json.loads(Path("model/report.json").read_text(encoding="utf-8"))
 
 
 def fail_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,7 +193,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]):
     [
         (["scans", "missing.ply"], r"missing.ply: there is no such file"),
         (["empty"], r"empty: the folder holds no scans"),
-        (["scans/*.xyz"], r"scans/\*.xyz: the pattern holds no scans"),
+        (["scans/*.xyz"], r"scans.\*.xyz: the pattern holds no scans"),
         (["notes.md"], r"notes.md: unknown format"),
         (["scans/a.ply"], r"only 1 of the scans"),
         (["scans/a.ply", "broken.ply"], r"only 1 of the scans"),
@@ -232,7 +232,7 @@ def test_unreadable_files_are_named_while_the_rest_goes_on(
     (scans / "truncated.ply").write_bytes(whole[: len(whole) // 2])
     assert scanweld("run", scans, "-o", "model") == 3
     out = capsys.readouterr().out
-    poses = json.loads(Path("model/poses.json").read_text())
+    poses = json.loads(Path("model/poses.json").read_text(encoding="utf-8"))
     assert list(poses["scans"]) == ["a", "b", "c"]
     assert list(poses["unplaced"]) == ["empty", "text", "truncated"]
     for name, reason in poses["unplaced"].items():
@@ -245,7 +245,10 @@ def test_same_stem_twice_gives_relative_paths(scans: Path):
         (scans / name).mkdir()
         shutil.move(scans / f"{'a' if name == 'left' else 'b'}.ply", scans / name / "s.ply")
     assert scanweld("run", scans / "left", scans / "right", "-o", "model") == 0
-    assert list(json.loads(Path("model/poses.json").read_text())["scans"]) == ["left/s", "right/s"]
+    assert list(json.loads(Path("model/poses.json").read_text(encoding="utf-8"))["scans"]) == [
+        "left/s",
+        "right/s",
+    ]
 
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names of files are text there")
@@ -253,18 +256,29 @@ def test_file_names_that_are_no_utf8_are_spelled_out(scans: Path):
     shutil.move(scans / "a.ply", os.fsdecode(os.fsencode(scans) + b"/\xff.ply"))
     Path(os.fsdecode(os.fsencode(scans) + b"/\xfe.ply")).write_text("broken")
     assert scanweld("run", scans, "-o", "model") == 3
-    poses = json.loads(Path("model/poses.json").read_text())
+    poses = json.loads(Path("model/poses.json").read_text(encoding="utf-8"))
     assert list(poses["scans"]) == ["\\xff", "b", "c"]
     assert "\\xfe.ply: not a PLY" in poses["unplaced"]["\\xfe"]
 
 
-def test_force_replaces_and_its_absence_refuses(scans: Path):
+def test_force_replaces_and_failing_runs_leave_an_earlier_output_whole(
+    scans: Path, monkeypatch: pytest.MonkeyPatch
+):
     assert scanweld("run", scans, "-o", "model") == 0
     Path("model/old").write_text("old")
     assert scanweld("run", scans, "-o", "model") == 1
     assert Path("model/old").exists()
     assert scanweld("run", scans, "-o", "model", "--force") == 0
     assert not Path("model/old").exists()
+    before = {path.name: path.read_bytes() for path in Path("model").iterdir()}
+    for error, code in ((InputError("too little"), 1), (KeyboardInterrupt(), 130)):
+        fail_with(error, monkeypatch)
+        assert scanweld("run", scans, "-o", "model", "--force") == code
+        assert {path.name: path.read_bytes() for path in Path("model").iterdir()} == before
+    fail_with(ZeroDivisionError("a bug"), monkeypatch)
+    with pytest.raises(ZeroDivisionError):
+        main(["run", str(scans), "-o", "other"])
+    assert not Path("other").exists()
 
 
 def test_interruption_exits_with_130_and_a_rerun_continues(
@@ -279,22 +293,6 @@ def test_interruption_exits_with_130_and_a_rerun_continues(
     monkeypatch.setattr(job.pipeline, "run", stub_run)
     assert scanweld("run", scans, "-o", "model") == 0
     assert not work_folder(Path("model")).exists()
-
-
-def test_failing_run_leaves_an_earlier_output_whole(scans: Path, monkeypatch: pytest.MonkeyPatch):
-    assert scanweld("run", scans, "-o", "model") == 0
-    before = {path.name: path.read_bytes() for path in Path("model").iterdir()}
-    for error, code in ((InputError("too little"), 1), (KeyboardInterrupt(), 130)):
-        fail_with(error, monkeypatch)
-        assert scanweld("run", scans, "-o", "model", "--force") == code
-        assert {path.name: path.read_bytes() for path in Path("model").iterdir()} == before
-
-
-def test_crash_is_no_success(scans: Path, monkeypatch: pytest.MonkeyPatch):
-    fail_with(ZeroDivisionError("a bug"), monkeypatch)
-    with pytest.raises(ZeroDivisionError):
-        main(["run", str(scans), "-o", "model"])
-    assert not Path("model").exists()
 
 
 def test_info_shows_what_was_read_and_names_the_broken_file(
@@ -328,7 +326,9 @@ def test_simulate_then_evaluate(capsys: pytest.CaptureFixture[str]):
     assert scanweld("simulate", "box.ply", "-o", "sim", *options) == 1
 
 
-def test_evaluate_finds_what_is_wrong(capsys: pytest.CaptureFixture[str]):
+def test_evaluate_finds_what_is_wrong_and_needs_every_placed_scan(
+    capsys: pytest.CaptureFixture[str], scans: Path
+):
     truth = {name: turned(k) for k, name in enumerate(("a", "b", "c"))}
     off = Pose.exp([0, 0, np.radians(10), 0, 0, 0])
     found = {"a": truth["a"], "b": truth["b"] @ off}
@@ -342,12 +342,9 @@ def test_evaluate_finds_what_is_wrong(capsys: pytest.CaptureFixture[str]):
     assert "of 3 scans: 1 right, 1 wrong, 1 unplaced" in out and "/ 10.000 deg" in out
     assert scanweld("evaluate", "poses.json", "missing.json") == 1
     assert "missing.json" in error_line(capsys)
-
-
-def test_evaluate_needs_every_placed_scan(scans: Path, capsys: pytest.CaptureFixture[str]):
     poses = a_result(["a", "elsewhere"]).poses
-    write_poses("poses.json", PoseSet(poses=dict(poses), components=(tuple(poses),)))
-    assert scanweld("evaluate", "poses.json", "poses.json", "--scans", scans) == 1
+    write_poses("more.json", PoseSet(poses=dict(poses), components=(tuple(poses),)))
+    assert scanweld("evaluate", "more.json", "more.json", "--scans", scans) == 1
     assert "elsewhere" in error_line(capsys)
 
 

@@ -1,6 +1,7 @@
 """From folders, patterns and files to scans with unique names."""
 
 import os
+import sys
 from itertools import permutations
 from pathlib import Path
 
@@ -33,6 +34,7 @@ def test_a_folder_gives_its_scans_in_natural_order(folder: Path) -> None:
     assert all(scan.path.parent == folder for scan in found)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
 def test_a_link_to_nothing_is_left_for_the_reader_to_name(folder: Path) -> None:
     (folder / "scan3.ply").symlink_to(folder / "gone.ply")
     assert "scan3" in names_of(folder) and "scan3" in names_of(f"{folder}/scan*.ply")
@@ -43,28 +45,19 @@ def test_a_link_to_nothing_is_left_for_the_reader_to_name(folder: Path) -> None:
 def test_a_pattern_is_a_folder_that_is_filtered(folder: Path) -> None:
     assert names_of(f"{folder}/scan*.ply") == ["scan2", "scan10"]
     assert names_of(f"{folder}/*") == ["Scan1", "cloud", "mesh", "scan2", "scan10"]
-
-
-def test_text_counts_only_when_named(folder: Path) -> None:
     assert names_of(f"{folder}/*.txt") == ["README"]
     assert names_of(folder / "README.txt", folder / "scan2.ply") == ["README", "scan2"]
-
-
-def test_a_file_whose_name_looks_like_a_pattern_is_that_file(folder: Path) -> None:
     (folder / "scan[2].ply").write_text("")
     assert names_of(folder / "scan[2].ply") == ["scan[2]"]
 
 
-def test_the_order_and_repetition_of_inputs_do_not_matter(folder: Path) -> None:
+def test_order_repetition_and_spelling_of_inputs_do_not_matter(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     inputs = [folder / "scan2.ply", folder / "inner", f"{folder}/*.obj", folder]
     results = {collect(order) for order in permutations(inputs)}
     assert len({tuple(scan.name for scan in result) for result in results}) == 1
     assert len(collect(inputs)) == 6
-
-
-def test_relative_and_absolute_paths_of_a_file_are_one(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.chdir(folder)
     found = collect(["scan2.ply", folder / "inner" / ".." / "scan2.ply"])
     assert len(found) == 1
@@ -75,33 +68,24 @@ def test_the_same_stem_twice_makes_all_names_relative_paths(folder: Path) -> Non
     assert names_of(folder, folder / "inner") == [
         *["Scan1", "cloud", "inner/scan2", "inner/scan3", "mesh", "scan2", "scan10"]
     ]
-
-
-def test_the_suffix_stays_where_only_it_tells_names_apart(folder: Path) -> None:
     inputs = [folder / "scan2.ply", folder / "scan2.obj", folder / "mesh.obj"]
     inputs[1].write_text("")
     assert names_of(*inputs) == ["mesh.obj", "scan2.obj", "scan2.ply"]
 
 
-def test_a_named_file_that_is_missing_is_an_error(folder: Path) -> None:
+def test_a_named_file_that_is_missing_or_of_an_unknown_format_is_an_error(folder: Path) -> None:
     with pytest.raises(ReadError, match=r"scan77\.ply: there is no such file"):
         collect([folder, folder / "scan77.ply"])
-
-
-def test_a_named_file_of_an_unknown_format_is_an_error(folder: Path) -> None:
     with pytest.raises(ReadError, match=r"poses\.json: unknown format"):
         collect([folder / "poses.json"])
+    with pytest.raises(InputError, match="no scans given"):
+        collect([])
 
 
 @pytest.mark.parametrize("what", ["folder.ply", "*.las", "none*.ply"])
 def test_a_folder_or_pattern_without_scans_is_an_error(folder: Path, what: str) -> None:
     with pytest.raises(InputError, match="holds no scans"):
         collect([os.path.join(folder, what)])
-
-
-def test_nothing_named_is_an_error() -> None:
-    with pytest.raises(InputError, match="no scans given"):
-        collect([])
 
 
 def test_natural_order() -> None:

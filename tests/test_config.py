@@ -1,5 +1,6 @@
 """Settings: defaults, files, ranges, and one clear line where something is wrong."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -32,46 +33,32 @@ def refusal(tmp_path: Path, text: str) -> str:
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        ("sed = 1", "sed"),
-        ("[pairs]\nmin_scores = 0.1", "pairs.min_scores"),
-        ("[pears]\nmin_score = 0.1", "pears"),
-        ("[fusion.more]\nx = 1", "fusion.more"),
+        ("sed = 1", "sed: no such setting; "),
+        ("[pairs]\nmin_scores = 0.1", "pairs.min_scores: no such setting; "),
+        ("[pears]\nmin_score = 0.1", "pears: no such setting; "),
+        ("[fusion.more]\nx = 1", "fusion.more: no such setting; "),
+        ("seed = -1", "seed: "),
+        ("[pairs]\nmin_score = 1.5", "pairs.min_score: "),
+        ("[pairs]\nnum_turns = 2", "pairs.num_turns: "),
+        ("[pairs]\nkeypoints = 'sift'", "pairs.keypoints: "),
+        ("[pairs]\ntolerance_diameters = [0.04, 0.02]", "pairs.tolerance_diameters.2: "),
+        ("[pairs]\ntolerance_diameters = [0.04, 0.02, 0.0]", "pairs.tolerance_diameters.2: "),
+        ("[pairs]\nnum_survivors = [300, 0]", "pairs.num_survivors.1: "),
+        ("[refine]\nmatch_diameters = [0.02, -1.0]", "refine.match_diameters.1: "),
+        ("[refine]\ncontour_weight = inf", "refine.contour_weight: "),
+        ("[graph]\nmax_cycle_deg = nan", "graph.max_cycle_deg: "),
+        ("[prepare]\nnum_samples = 'many'", "prepare.num_samples: "),
+        ("[prepare]\nimage_pixels = 100.5", "prepare.image_pixels: "),
+        ("[contours]\ntrim = 0.0", "contours.trim: "),
+        ("unit = 'furlong'", "unit: "),
+        ("method = 'nonsense'", "method: .*robust.*paper"),
+        ("[coarse]\nicp = 'splines'", "coarse.icp: "),
+        ("[heat]\nsurface = 'ajar'", "heat.surface: "),
+        ("pairs = 3", "pairs: "),
     ],
 )
-def test_an_unknown_setting_is_named(tmp_path: Path, text: str, place: str):
-    assert f": {place}: no such setting; " in refusal(tmp_path, text)
-
-
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("seed = -1", "seed"),
-        ("[pairs]\nmin_score = 1.5", "pairs.min_score"),
-        ("[pairs]\nnum_turns = 2", "pairs.num_turns"),
-        ("[pairs]\nkeypoints = 'sift'", "pairs.keypoints"),
-        ("[pairs]\ntolerance_diameters = [0.04, 0.02]", "pairs.tolerance_diameters.2"),
-        ("[pairs]\ntolerance_diameters = [0.04, 0.02, 0.0]", "pairs.tolerance_diameters.2"),
-        ("[pairs]\nnum_survivors = [300, 0]", "pairs.num_survivors.1"),
-        ("[refine]\nmatch_diameters = [0.02, -1.0]", "refine.match_diameters.1"),
-        ("[refine]\ncontour_weight = inf", "refine.contour_weight"),
-        ("[graph]\nmax_cycle_deg = nan", "graph.max_cycle_deg"),
-        ("[prepare]\nnum_samples = 'many'", "prepare.num_samples"),
-        ("[prepare]\nimage_pixels = 100.5", "prepare.image_pixels"),
-        ("[contours]\ntrim = 0.0", "contours.trim"),
-        ("unit = 'furlong'", "unit"),
-        ("method = 'nonsense'", "method"),
-        ("[coarse]\nicp = 'splines'", "coarse.icp"),
-        ("[heat]\nsurface = 'ajar'", "heat.surface"),
-        ("pairs = 3", "pairs"),
-    ],
-)
-def test_a_setting_out_of_its_range_is_named(tmp_path: Path, text: str, place: str):
-    assert f": {place}: " in refusal(tmp_path, text)
-
-
-def test_an_unknown_method_is_told_the_two_there_are(tmp_path: Path):
-    told = refusal(tmp_path, "method = 'nonsense'")
-    assert "robust" in told and "paper" in told
+def test_a_setting_unknown_or_out_of_its_range_is_named(tmp_path: Path, text: str, place: str):
+    assert re.search(f": {place}", refusal(tmp_path, text))
 
 
 @pytest.mark.parametrize("text", ["seed = ", "[pairs", "seed = 1\nseed = 2", "= 3", "a b c\n" * 3])
@@ -111,7 +98,7 @@ def test_written_settings_are_complete():
     assert "unit" not in tomllib.loads(Config().to_toml())
 
 
-def test_defaults_then_file_then_overrides(tmp_path: Path):
+def test_defaults_then_file_then_overrides_and_no_other_change(tmp_path: Path):
     path = tmp_path / "config.toml"
     path.write_text("seed = 3\nunit = 'cm'\n[graph]\nmin_margin = 0.5\n", encoding="utf-8")
     config = load_config(path, seed=4, unit=None)
@@ -120,14 +107,8 @@ def test_defaults_then_file_then_overrides(tmp_path: Path):
     assert config.graph.min_margin == 0.5
     assert config.graph.max_violation == Config().graph.max_violation
     assert load_config(None) == Config()
-
-
-def test_a_wrong_override_is_refused():
     with pytest.raises(ConfigError, match="settings: seed"):
         load_config(None, seed=-3)
-
-
-def test_settings_are_frozen():
     with pytest.raises(ValidationError):
         Config().seed = 1  # type: ignore[misc]
     with pytest.raises(ValidationError):

@@ -101,9 +101,6 @@ def test_near_and_far_side_of_a_step():
     assert np.flatnonzero(near.any(axis=0)).tolist() == [2, 5]
     assert np.flatnonzero(far.all(axis=0)).tolist() == [4]
     assert np.flatnonzero(far.any(axis=0)).tolist() == [4]
-
-
-def test_small_steps_are_no_contours():
     depth = 10.0 + np.arange(8.0)[None, :].repeat(6, axis=0)
     nowhere = np.zeros(depth.shape, dtype=bool)
     assert not near_side(depth, nowhere, 1.5).any()
@@ -217,40 +214,20 @@ def test_outline_distance_ignores_sliding():
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(("gap", "degrees"), [(60, 0.0), (60, 20.0), (90, 20.0)])
-@pytest.mark.parametrize("residual", ["point, image", "normal"])
+@pytest.mark.parametrize("residual", ["point, image", "normal", "point"])
 def test_mm_icc_keeps_and_finds_the_truth(
     model: CameraModel, gap: int, degrees: float, residual: str
 ):
-    """Right to half a pixel, where point to plane finds no match at all."""
+    """Right to half a pixel, where point to plane finds no match at all; in space less closely."""
     pair = creature_pair(gap, model)
     config = ContoursConfig.model_validate({"residual": residual})
     aligned, i_from_j = aligned_pair(pair, nudged(pair, degrees), config)
     angle, shift = pair.off_by(i_from_j)
-    assert angle < 1.2
-    assert shift < 0.005
+    slack = 2.0 if residual == "point" else 1.0
+    assert angle < 1.2 * slack
+    assert shift < 0.005 * slack
     assert aligned.coherence > 0.5
     assert aligned.num_matches > 50
-
-
-def test_distance_in_space_finds_the_truth_less_closely():
-    pair = creature_pair(60)
-    start = nudged(pair, 20.0)
-    _, i_from_j = aligned_pair(pair, start, ContoursConfig(residual="point"))
-    angle, shift = pair.off_by(i_from_j)
-    assert angle < 2.0
-    assert shift < 0.01
-
-
-def test_unit_of_length_does_not_matter():
-    small, large = creature_pair(60), creature_pair(60, factor=1000.0)
-    a, a_pose = aligned_pair(small, nudged(small, 10.0))
-    b, b_pose = aligned_pair(large, nudged(large, 10.0))
-    np.testing.assert_allclose(a_pose.rotation, b_pose.rotation, atol=1e-4)
-    np.testing.assert_allclose(
-        1000.0 * a_pose.translation, b_pose.translation, atol=1e-4 * large.diameter
-    )
-    assert b.coherence == pytest.approx(a.coherence, abs=0.01)
-    assert b.rms == pytest.approx(a.rms, rel=0.01)
 
 
 def test_wrong_poses_do_not_cohere():
@@ -258,6 +235,12 @@ def test_wrong_poses_do_not_cohere():
     right, _ = aligned_pair(pair, pair.i_from_j)
     wrong, _ = aligned_pair(pair, nudged(pair, 120.0))
     assert wrong.coherence < 0.6 * right.coherence
+    matches = contour_matcher(pair.scans, CONFIG).matches(0, 1, pair.i_from_j.inverse())
+    pixel = pair.scans[1].image.pixel
+    assert len(matches) > 20
+    assert np.abs(matches.residuals).max() <= 4 * pixel
+    seen, _ = pair.scans[1].image.camera.project(matches.points)
+    assert (np.abs(seen - seen.round()) < 1e-6).all()
 
 
 def test_too_few_contours_leave_the_pose():
@@ -271,13 +254,3 @@ def test_too_few_contours_leave_the_pose():
     assert not aligned.converged
     assert aligned.loose == (1,)
     np.testing.assert_array_equal(aligned.poses[1].matrix(), start.matrix())
-
-
-def test_contour_matcher_speaks_of_scans_by_number():
-    pair = creature_pair(60)
-    matches = contour_matcher(pair.scans, CONFIG).matches(0, 1, pair.i_from_j.inverse())
-    pixel = pair.scans[1].image.pixel
-    assert len(matches) > 20
-    assert np.abs(matches.residuals).max() <= 4 * pixel
-    seen, _ = pair.scans[1].image.camera.project(matches.points)
-    assert (np.abs(seen - seen.round()) < 1e-6).all()

@@ -23,21 +23,22 @@ def test_a_creature_is_one_closed_body(seed: int):
     assert 5_000 < len(mesh.faces) < 20_000
 
 
-def test_the_full_creature_has_enough_faces():
+def test_the_full_creature_has_enough_faces_and_plain_objects_are_closed():
     mesh = creature()
     assert 50_000 < len(mesh.faces) < 100_000
     assert as_trimesh(mesh).is_watertight
     assert mesh.colors is not None
     assert mesh.colors.std(axis=0).min() > 10
+    for make in PRIMITIVES.values():
+        mesh = as_trimesh(make())
+        assert mesh.is_watertight
+        assert mesh.volume > 0
 
 
-def test_a_creature_is_the_same_each_time():
+def test_a_creature_is_the_same_each_time_and_another_for_each_seed():
     first, again = creature(3, voxels=60), creature(3, voxels=60)
     assert first.vertices.tobytes() == again.vertices.tobytes()
     assert first.faces.tobytes() == again.faces.tobytes()
-
-
-def test_seeds_give_different_creatures():
     volumes = [as_trimesh(small_creature(seed)).volume for seed in range(4)]
     assert np.diff(np.sort(volumes)).min() > 0.001 * max(volumes)
 
@@ -52,10 +53,3 @@ def test_a_creature_has_no_symmetry():
     for signs in ([1, -1, -1], [-1, 1, -1], [-1, -1, 1], [-1, 1, 1], [1, -1, 1], [1, 1, -1]):
         distance, _ = tree.query((centred @ axes) * signs)
         assert np.percentile(distance, 75) > 5
-
-
-def test_plain_objects_are_closed():
-    for make in PRIMITIVES.values():
-        mesh = as_trimesh(make())
-        assert mesh.is_watertight
-        assert mesh.volume > 0

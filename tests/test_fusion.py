@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
-from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
 from scanweld.fusion.cases import edge_corners, triangle_table
 from scanweld.fusion.surface import extract_surface
@@ -25,32 +23,14 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.shading import render_shaded, side_by_side, write_png
 from scanweld.preparation import prepare
 from tests.meshes import edges_of, is_closed, joined
+from tests.posed_scans import RADIUS, Posed, off_sphere, scanned, views_of
 
-RADIUS = 50.0
-SIX_SIDES = [(0, 0), (90, 0), (180, 0), (270, 0), (0, 89), (0, -89)]
 CONFIG = FusionConfig()
-Posed = tuple[list[PreparedScan], list[Pose]]
-
-
-def views_of(
-    mesh: TriangleMesh, angles: Sequence[tuple[float, float]], **options: Any
-) -> list[View]:
-    options = {"pixels": 120.0, "model": CameraModel.ORTHOGRAPHIC} | options
-    return [view_of(mesh, azimuth, elevation, **options) for azimuth, elevation in angles]
-
-
-def scanned(mesh: TriangleMesh, views: Sequence[View], noise: NoiseModel | None = None) -> Posed:
-    scans = [
-        scan_mesh(mesh, v.camera, v.world_from_sensor, noise, seed=k, name=f"scan_{k}")
-        for k, v in enumerate(views)
-    ]
-    prepared = [prepare(scan, PrepareConfig()) for scan in scans]
-    return prepared, [v.world_from_sensor for v in views]
 
 
 @lru_cache
 def sphere_scans(model: CameraModel = CameraModel.ORTHOGRAPHIC) -> Posed:
-    return scanned(sphere(RADIUS), views_of(sphere(RADIUS), SIX_SIDES, model=model))
+    return scanned(sphere(RADIUS), views_of(sphere(RADIUS), model=model))
 
 
 def voxel_of(scans: Sequence[PreparedScan]) -> float:
@@ -91,8 +71,8 @@ def test_unit_does_not_matter(factor: float):
     """Every decision must fall the same way; images hold single precision."""
     mesh = sphere(RADIUS)
     large = replace(mesh, vertices=factor * mesh.vertices)
-    expected = fuse(*scanned(mesh, views_of(mesh, SIX_SIDES[:3])), CONFIG)
-    fused = fuse(*scanned(large, views_of(large, SIX_SIDES[:3])), CONFIG)
+    expected = fuse(*scanned(mesh, views_of(mesh)[:3]), CONFIG)
+    fused = fuse(*scanned(large, views_of(large)[:3]), CONFIG)
     np.testing.assert_array_equal(fused.faces, expected.faces)
     np.testing.assert_allclose(fused.vertices / factor, expected.vertices, atol=1e-6 * RADIUS)
 
@@ -111,7 +91,7 @@ def test_free_space_carves_what_one_scan_made_up():
     """A ball floats over the sphere in one scan; three others look through where it would be."""
     ball = moved(sphere(6.0), 0.0, 0.0, 80.0)
     whole = joined(sphere(RADIUS), ball)
-    views = views_of(whole, SIX_SIDES, pixels=180.0)
+    views = views_of(whole, pixels=180.0)
     scans, poses = scanned(sphere(RADIUS), views)
     (liar,), _ = scanned(whole, views[:1])
     mesh = fuse([liar, *scans[1:]], poses, CONFIG)
@@ -141,7 +121,7 @@ def test_parts_that_nobody_saw_are_not_bridged():
     mesh = fuse(scans[:1], poses[:1], CONFIG)
     toward = -poses[0].rotation[:, 2]
     assert (mesh.vertices @ toward).min() > -voxel_of(scans)
-    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.5 * voxel_of(scans)
+    assert np.abs(off_sphere(mesh.vertices)).max() < 0.5 * voxel_of(scans)
     assert (edges_of(mesh.faces)[1] == 1).any()
 
 
@@ -157,29 +137,15 @@ def test_two_plates_stay_apart():
     assert (np.abs(np.abs(mesh.vertices[:, 2]) - 10.0) < voxel).all()
 
 
-def test_thin_walls_keep_both_sides():
-    """A plate of two voxels' thickness, scanned from all around, is as thick as it should be."""
-    thin = plate(100.0, 80.0, 4.0)
-    scans, poses = scanned(thin, views_of(thin, [(0, 89), (0, -89), (40, 60), (220, -60)]))
-    mesh = fuse(scans, poses, CONFIG)
-    inner = (np.abs(mesh.vertices[:, 0]) < 40) & (np.abs(mesh.vertices[:, 1]) < 30)
-    assert np.abs(np.abs(mesh.vertices[inner, 2]) - 2.0).max() < 0.2 * voxel_of(scans)
-    assert (mesh.vertices[inner, 2] > 0).any() and (mesh.vertices[inner, 2] < 0).any()
-
-
-def test_dropouts_do_not_eat_what_another_scan_saw():
-    views = views_of(sphere(RADIUS), SIX_SIDES)
+def test_what_one_scan_lost_does_not_eat_what_another_saw():
+    views = views_of(sphere(RADIUS))
     whole, poses = sphere_scans()
     holed, _ = scanned(sphere(RADIUS), views, NoiseModel(dropout=0.3))
     mesh = fuse([*whole, *holed], [*poses, *poses], CONFIG)
     assert is_closed(mesh.faces)
-    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - RADIUS).max() < 0.5 * voxel_of(whole)
-
-
-def test_a_scan_that_lost_half_of_the_object_does_not_carve_it():
-    """Its sensor saw nothing of one half, which looks like free space; the other scans know."""
+    assert np.abs(off_sphere(mesh.vertices)).max() < 0.5 * voxel_of(whole)
     scans, poses = sphere_scans()
-    view = views_of(sphere(RADIUS), SIX_SIDES)[0]
+    view = views_of(sphere(RADIUS))[0]
     seen = scan_mesh(sphere(RADIUS), view.camera, view.world_from_sensor)
     assert seen.grid is not None
     half = np.where(np.arange(seen.grid.shape[1]) < seen.grid.shape[1] // 2, seen.grid, -1)
@@ -194,7 +160,7 @@ def test_colors_are_those_of_the_nearest_surface():
     mesh = sphere(RADIUS)
     red = mesh.vertices[:, 2] > 0
     colored = replace(mesh, colors=np.where(red[:, None], [250, 10, 10], [10, 10, 250]))
-    fused = fuse(*scanned(colored, views_of(mesh, SIX_SIDES)), CONFIG)
+    fused = fuse(*scanned(colored, views_of(mesh)), CONFIG)
     assert fused.colors is not None
     off_seam = np.abs(fused.vertices[:, 2]) > 5.0
     is_red = fused.colors[:, 0] > fused.colors[:, 2]

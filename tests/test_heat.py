@@ -27,6 +27,7 @@ from scanweld.heat.laplacian import eigenpairs
 from scanweld.heat.signature import diffusion_times, heat_signature, sun_times
 from scanweld.heat.surface import heat_surface
 from scanweld.preparation import prepare
+from tests.meshes import edges_of
 from tests.scenes import MILD_NOISE, small_creature
 
 CONFIG = HeatConfig(max_front_vertices=1000, num_modes=80)
@@ -68,8 +69,7 @@ def ball(subdivisions: int) -> tuple[FloatArray, IntArray]:
 
 
 def euler(faces: IntArray) -> int:
-    edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    return len(np.unique(faces)) - len(edges) + len(faces)
+    return len(np.unique(faces)) - len(edges_of(faces)[0]) + len(faces)
 
 
 CASES = [
@@ -80,10 +80,13 @@ CASES = [
 
 
 @pytest.mark.parametrize(("azimuth", "model", "noise", "max_vertices"), CASES)
-def test_artificial_mesh_is_closed_and_manifold(
+def test_artificial_mesh_is_closed_manifold_and_twice_its_front(
     azimuth: float, model: CameraModel, noise: NoiseModel | None, max_vertices: int
 ):
-    """Every directed edge once, its reverse once; one fan of faces around each vertex."""
+    """Every directed edge once, its reverse once; one fan of faces around each vertex.
+
+    Back and walls have the front's holes: the Euler characteristic doubles, piece by piece.
+    """
     front, mesh = closed(prepared(azimuth, model, noise), max_vertices)
     start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     span = len(mesh.vertices)
@@ -94,6 +97,12 @@ def test_artificial_mesh_is_closed_and_manifold(
     fans = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_faces
     assert len(front.points) <= max_vertices
     assert all(is_one_fan(mesh.faces[fan[fan >= 0]], v) for v, fan in enumerate(fans))
+    piece = pieces(mesh.faces, len(mesh.vertices))
+    front_piece = pieces(front.faces, len(front.points))
+    assert len(np.unique(piece)) == len(np.unique(front_piece)) >= 1
+    for p in np.unique(piece):
+        of_front = front.faces[piece[front.faces[:, 0]] == p]
+        assert euler(mesh.faces[piece[mesh.faces[:, 0]] == p]) == 2 * euler(of_front)
 
 
 def is_one_fan(faces: IntArray, vertex: int) -> bool:
@@ -108,20 +117,6 @@ def is_one_fan(faces: IntArray, vertex: int) -> bool:
         if here == first:
             return step == len(following)
     return False
-
-
-@pytest.mark.parametrize(("azimuth", "model", "noise", "max_vertices"), CASES)
-def test_each_closed_piece_is_two_copies_of_its_front(
-    azimuth: float, model: CameraModel, noise: NoiseModel | None, max_vertices: int
-):
-    """Back and walls have the front's holes: the Euler characteristic doubles, piece by piece."""
-    front, mesh = closed(prepared(azimuth, model, noise), max_vertices)
-    piece = pieces(mesh.faces, len(mesh.vertices))
-    front_piece = pieces(front.faces, len(front.points))
-    assert len(np.unique(piece)) == len(np.unique(front_piece)) >= 1
-    for p in np.unique(piece):
-        of_front = front.faces[piece[front.faces[:, 0]] == p]
-        assert euler(mesh.faces[piece[mesh.faces[:, 0]] == p]) == 2 * euler(of_front)
 
 
 def test_front_is_measured_and_walls_run_behind_it():
@@ -191,19 +186,6 @@ def test_sphere_has_the_spectrum_of_spherical_harmonics():
     assert functions[:, 0] ** 2 == pytest.approx(np.full(len(functions), 1 / (4 * np.pi)), rel=0.01)
 
 
-def test_open_square_has_the_spectrum_of_cosines():
-    x, y = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41))
-    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(41**2)], axis=1)
-    index = np.arange(41**2).reshape(41, 41)
-    a, b, c, d = (
-        part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
-    )
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    values, _ = eigenpairs(vertices, faces, 10)
-    waves = np.sort([np.pi**2 * (m * m + n * n) for m in range(5) for n in range(5)])[:10]
-    assert values == pytest.approx(waves, rel=0.02, abs=1e-9)
-
-
 def disc(num_rings: int = 30) -> tuple[FloatArray, IntArray]:
     """A flat disc of radius 1."""
     rings = [
@@ -268,14 +250,11 @@ def test_signature_follows_the_eigenpairs_and_not_their_signs():
     assert np.array_equal(signature, heat_signature(values, functions * flips, times))
     # All points of a sphere are alike, and share the heat trace evenly.
     assert signature == pytest.approx(np.full(signature.shape, -np.log(4 * np.pi)), abs=0.1)
-
-
-def test_shortest_time_stays_below_the_longest():
     times = diffusion_times(np.array([0.0, 1.0, 2.0]), 4, 1e-3)
     assert np.all(np.diff(times) > 0)
 
 
-def test_keypoints_lie_on_the_surface_off_the_rims():
+def test_keypoints_lie_on_the_surface_off_the_rims_and_apart():
     scan, found = prepared(20.0), described(20.0)
     assert len(found.points) >= 10
     pixels, depth = scan.image.camera.project(found.points)
@@ -289,21 +268,10 @@ def test_keypoints_lie_on_the_surface_off_the_rims():
     moved = np.linalg.norm(found.points - found.found_at, axis=1) / scan.diameter
     assert moved.max() < CONFIG.group_diameters
     assert (moved > 0).any()
-
-
-def test_keypoints_stand_apart():
-    found = described(20.0)
     gaps = np.linalg.norm(found.points[:, None] - found.points, axis=-1)
     np.fill_diagonal(gaps, np.inf)
     unlike = np.sqrt(np.mean((found.signatures[:, None] - found.signatures) ** 2, axis=-1)) >= 0.5
     assert ((gaps >= CONFIG.group_diameters * prepared(20.0).diameter) | unlike).all()
-
-
-def test_same_scan_gives_same_bytes():
-    again = describe(prepare(scan_of_creature(20.0), PrepareConfig()), CONFIG)
-    for field in dataclasses.fields(again):
-        one, other = getattr(described(20.0), field.name), getattr(again, field.name)
-        assert one.tobytes() == other.tobytes(), field.name
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1024.0])
@@ -352,7 +320,7 @@ def test_mirror_halves_have_mirrored_signatures():
     assert np.ptp(signature, axis=0).min() > 0.1
 
 
-def test_a_maximum_must_persist():
+def test_a_maximum_must_persist_and_be_the_strongest_of_its_like():
     """Two bumps on a strip: one at both times, one at the first only."""
     points = np.stack([np.arange(20.0), np.zeros(20), np.zeros(20)], axis=1)
     faces = np.stack([np.arange(18), np.arange(1, 19), np.arange(2, 20)], axis=1)
@@ -361,26 +329,21 @@ def test_a_maximum_must_persist():
     found = persistent_maxima(signature, points, faces, 2.0)
     assert found.vertices.tolist() == [5]
     assert persistent_maxima(np.zeros((20, 3)), points, faces, 2.0).vertices.tolist() == []
-
-
-def test_group_keeps_the_strongest_of_like_neighbours():
     points = np.array([[0.0, 0, 0], [0.5, 0, 0], [0.4, 0, 0], [5.0, 0, 0]])
     signatures = np.array([[0.0, 0.0], [0.1, 0.0], [3.0, 3.0], [0.0, 0.0]])
     kept = group(points, signatures, np.array([1.0, 2.0, 0.5, 1.5]), 1.0)
     assert kept.tolist() == [1, 3, 2]
 
 
-def test_a_scan_too_small_gets_no_keypoints(caplog: pytest.LogCaptureFixture):
+def test_what_gives_no_keypoints_says_so(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+):
     with caplog.at_level(logging.INFO, logger="scanweld.heat.features"):
         none = describe(prepared(20.0), HeatConfig(max_front_vertices=200, num_modes=150))
     assert none.points.shape == (0, 3)
     assert none.signatures.shape == (0, 10)
     assert "no heat keypoints" in caplog.text
 
-
-def test_an_unsolved_eigenproblem_gives_no_keypoints(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-):
     def fail(*_: object) -> None:
         raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
 
@@ -388,9 +351,6 @@ def test_an_unsolved_eigenproblem_gives_no_keypoints(
     with caplog.at_level(logging.WARNING, logger="scanweld.heat.features"):
         assert len(describe(prepared(20.0), CONFIG).points) == 0
     assert "not solved" in caplog.text
-
-
-def test_an_image_without_surface_has_an_empty_front():
     image = prepared(20.0).image
     nothing = dataclasses.replace(image, depth=np.full(image.depth.shape, np.nan))
     assert len(thin_front(nothing, 500).faces) == 0

@@ -24,14 +24,12 @@ def test_scans_of_one_side_stand_together():
 
 
 def test_labels_are_short_and_numbers_keep_their_zeros():
-    assert [look.label for look in scan_looks(["scan_1", "scan_2", "scan_10"]).values()] == [
-        "1",
-        "2",
-        "10",
-    ]
-    assert [look.label for look in scan_looks(["a_08", "a_09"]).values()] == ["08", "09"]
-    looks = scan_looks(["the first of all", "another one"])
-    assert [look.label for look in looks.values()] == ["1", "2"]
+    for names, labels in (
+        (["scan_1", "scan_2", "scan_10"], ["1", "2", "10"]),
+        (["a_08", "a_09"], ["08", "09"]),
+        (["the first of all", "another one"], ["1", "2"]),
+    ):
+        assert [look.label for look in scan_looks(names).values()] == labels
     assert len(set(scan_colors(60))) == 60
 
 

@@ -25,7 +25,6 @@ from scanweld.errors import InputError, ReadError
 from scanweld.evaluation.primitives import sphere
 from scanweld.evidence.slippage import Slide
 from scanweld.geometry.mesh import TriangleMesh, face_normals
-from scanweld.io import write_scan_ply
 from scanweld.pairs.result import PairKind
 from scanweld.preparation.support import find_support
 from scanweld.reconstruction import FactReport, FactVerdict, ScanVerdict
@@ -33,6 +32,7 @@ from tests.command_line import scanweld as command
 from tests.html_pages import Page
 from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
 from tests.results import a_pair, a_result, no_pair
+from tests.scenes import write_scans
 from tests.test_support import on_table, seen
 
 pytestmark = pytest.mark.slow
@@ -67,9 +67,6 @@ def test_page_is_well_formed_and_needs_nothing_else(made: Made, page: Page):
         if found.get("href", "").startswith("#"):
             assert found["href"][1:] in ids
     assert "@import" not in text and "url(" not in text
-
-
-def test_pictures_have_words(page: Page):
     pictures = [found for tag, found in page.elements if tag == "img"]
     assert len(pictures) == 3 + 2 + 3
     assert all(found["alt"] for found in pictures)
@@ -78,8 +75,8 @@ def test_pictures_have_words(page: Page):
 
 
 def test_numbers_are_those_of_the_files(made: Made, page: Page):
-    report = json.loads((made.folder / "report.json").read_text())
-    graph = json.loads((made.folder / "graph.json").read_text())
+    report = json.loads((made.folder / "report.json").read_text(encoding="utf-8"))
+    graph = json.loads((made.folder / "graph.json").read_text(encoding="utf-8"))
     for name, scan in report["scans"].items():
         wanted = {repr(scan["overlap"]), repr(scan["rms"]), str(scan["num_points"])}
         assert wanted <= page.values(), name
@@ -90,9 +87,6 @@ def test_numbers_are_those_of_the_files(made: Made, page: Page):
     for pair, found in zip(graph["pairs"], shown, strict=True):
         assert found.items() <= {"confidence": None, **pair}.items()
     assert f"All {len(report['scans'])} scans are placed." in page.words
-
-
-def test_same_files_give_the_same_bytes(made: Made):
     before = (made.folder / "report.html").read_bytes()
     write_html_report(made.folder, dict(reversed(made.scans.items())))
     assert (made.folder / "report.html").read_bytes() == before
@@ -151,7 +145,7 @@ def test_residuals_are_of_the_scans_that_the_model_was_made_of(tmp_path: Path, w
     assert any(f"The fused surface of {len(shown)} scans" in words for words in page.words)
 
 
-def test_residual_and_support_of_a_ball_measured_too_large():
+def test_residual_support_and_holes_of_a_ball():
     ball = sphere(50.0)
     outside = ball.vertices * 1.01
     upper = outside[outside[:, 2] > 0]
@@ -166,10 +160,6 @@ def test_residual_and_support_of_a_ball_measured_too_large():
     assert np.allclose(check.residual, 0.5, atol=1e-3)
     far = check_surface(ball, {"far": ball.vertices * 3})
     assert far.off_model == 1 and not len(far.all_distances()) and np.isnan(far.residual).all()
-
-
-def test_a_hole_is_found_and_measured():
-    ball = sphere(50.0)
     kept = (ball.vertices[ball.faces][..., 2] < 40).all(axis=1)
     cut = TriangleMesh(vertices=ball.vertices, faces=ball.faces[kept])
     borders = open_borders(cut)
@@ -226,23 +216,20 @@ def test_odd_names_are_only_text(tmp_path: Path):
     assert {pair["i"] for pair in json.loads(page.text["pairs-data"])} <= set(ODD)
 
 
-def test_nothing_placed(tmp_path: Path):
+def test_nothing_placed_or_one_scan_and_pairs_without_numbers(tmp_path: Path):
     result = a_result([], {"a": "shows no surface", "b": "too few points"})
     write_html_report(written(tmp_path, result), {})
     page = page_of(tmp_path)
     assert "No two of the 2 scans could be brought together." in page.words
     assert "canvas" not in [tag for tag, _ in page.elements]
     assert any("shows no surface" in words for words in page.words)
-
-
-def test_one_placed_scan_and_pairs_without_numbers(tmp_path: Path):
     result = a_result(["a"], {"b": "fits nowhere"})
     result = dataclasses.replace(result, pairs=(no_pair("a", "b"),))
     write_html_report(written(tmp_path, result))
     assert "1 of 2 scans are placed." in page_of(tmp_path).words
 
 
-def test_sixty_scans(tmp_path: Path):
+def test_sixty_scans_and_several_components(tmp_path: Path):
     names = [f"turn_{k:02d}" for k in range(60)]
     folder = crowd(tmp_path, names)
     write_html_report(folder)
@@ -250,9 +237,6 @@ def test_sixty_scans(tmp_path: Path):
     cells = [found for tag, found in page.elements if tag == "td" and "data-pair" in found]
     assert len(cells) == 60 * 59 and all(found["title"] for found in cells)
     assert (folder / "report.html").stat().st_size < 4e6
-
-
-def test_several_components_are_told_apart(tmp_path: Path):
     result = dataclasses.replace(
         a_result(["a", "b", "c", "d"]), components=(("a", "b"), ("d", "c"))
     )
@@ -262,7 +246,7 @@ def test_several_components_are_told_apart(tmp_path: Path):
     assert any("Component 2" in each for each in words) and "reference d" in words
 
 
-def test_what_was_known_beforehand_is_shown_with_what_became_of_it(tmp_path: Path):
+def test_what_was_known_and_what_a_pair_slides_like_are_shown(tmp_path: Path):
     facts = (
         FactReport(fact="fix a", verdict=FactVerdict.HELD, reason="a: its frame is the world"),
         FactReport(fact="apart a b", verdict=FactVerdict.CONTRADICTED, reason="they are one"),
@@ -274,17 +258,6 @@ def test_what_was_known_beforehand_is_shown_with_what_became_of_it(tmp_path: Pat
     assert {"fix a", " held: a: its frame is the world"} <= set(page.words)
     assert {"apart a b", " contradicted: they are one"} <= set(page.words)
     assert any(found.get("class") == "contradicted" for _, found in page.elements)
-
-
-def test_pairs_are_drawn_by_confidence_where_there_is_one():
-    told = {"kind": "good", "accepted": True, "reason": "", "overlap": 0.5, "evidence": None}
-    told |= {"i": "a", "j": "b", "margin": 1.0, "observability": 0.1, "score": 0.6}
-    assert pair_level(PairEntry.model_validate(told)) == 4
-    assert pair_level(PairEntry.model_validate({**told, "score": None})) == 0
-    assert pair_level(PairEntry.model_validate({**told, "confidence": 0.5})) == 2
-
-
-def test_what_a_pair_slides_like_is_shown(tmp_path: Path):
     sliding = dataclasses.replace(a_pair("a", "b"), kind=PairKind.SLIDING, sliding=Slide.CYLINDER)
     folder = written(tmp_path, dataclasses.replace(a_result(["a", "b"]), pairs=(sliding,)))
     write_html_report(folder)
@@ -296,7 +269,7 @@ def test_what_a_pair_slides_like_is_shown(tmp_path: Path):
 def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
     folder = written(tmp_path, good_result(small_scene()))
     for name, key in (("report.json", "scans"), ("graph.json", "pairs")):
-        content = json.loads((folder / name).read_text())
+        content = json.loads((folder / name).read_text(encoding="utf-8"))
         entries = content[key].values() if key == "scans" else content[key]
         for entry in entries:
             entry["confidence"] = 0.98765
@@ -305,6 +278,11 @@ def test_confidence_is_shown_where_there_is_one(tmp_path: Path):
     page = page_of(folder)
     assert "0.98765" in page.values() and "98.8\u00a0%" in page.words
     assert all(pair["confidence"] == 0.98765 for pair in json.loads(page.text["pairs-data"]))
+    told = {"kind": "good", "accepted": True, "reason": "", "overlap": 0.5, "evidence": None}
+    told |= {"i": "a", "j": "b", "margin": 1.0, "observability": 0.1, "score": 0.6}
+    assert pair_level(PairEntry.model_validate(told)) == 4
+    assert pair_level(PairEntry.model_validate({**told, "score": None})) == 0
+    assert pair_level(PairEntry.model_validate({**told, "confidence": 0.5})) == 2
 
 
 @pytest.mark.parametrize(
@@ -331,16 +309,13 @@ def test_a_broken_folder_is_told_in_a_line(
     assert not (folder / "report.html").exists()
 
 
-def test_files_of_different_runs_are_refused(tmp_path: Path):
+def test_files_of_different_runs_and_other_scans_are_refused(tmp_path: Path):
     folder = whole_folder(tmp_path / "a").folder
     other = written(tmp_path / "b", a_result(["x", "y"]))
     (other / "poses.json").replace(folder / "poses.json")
     with pytest.raises(ReadError, match="does not know the scan 'x'"):
         write_html_report(folder)
-
-
-def test_other_scans_are_refused(tmp_path: Path):
-    made = whole_folder(tmp_path)
+    made = whole_folder(tmp_path / "c")
     first, *others = made.scans
     with pytest.raises(InputError, match="has a pose but is not among"):
         write_html_report(made.folder, {name: made.scans[name] for name in others})
@@ -350,10 +325,7 @@ def test_other_scans_are_refused(tmp_path: Path):
 
 def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     scene = small_scene()
-    scans = tmp_path / "scans"
-    scans.mkdir()
-    for scan in scene.scans:
-        write_scan_ply(scans / f"{scan.name}.ply", scan)
+    scans = write_scans(tmp_path / "scans", scene.scans)
     read, _ = job.read_all(job.collect([scans]))
     result = good_result(dataclasses.replace(scene, scans=tuple(read)))
     folder = written(tmp_path / "model", result)

@@ -80,7 +80,7 @@ def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same
     undisturbed, journal = tmp_path / "undisturbed", tmp_path / "journal"
     whole = run(scans, undisturbed, journal)
     assert whole.returncode == 0, whole.stderr
-    num_steps, finished = int(whole.stdout), journal.read_text().split()
+    num_steps, finished = int(whole.stdout), journal.read_text(encoding="utf-8").split()
     journal.unlink()
 
     output = tmp_path / "model"
@@ -99,7 +99,7 @@ def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same
     assert last.returncode == 0, last.stderr
     assert contents(output) == contents(undisturbed)
     # No piece of work was finished twice; a run may have died just before it told of one.
-    told = journal.read_text().split()
+    told = journal.read_text(encoding="utf-8").split()
     assert len(set(told)) == len(told) >= len(finished) - NUM_KILLS >= 5
     assert set(told) <= set(finished)
     assert not work_folder(output).exists()

@@ -68,11 +68,18 @@ def files(folder: Path, count: int, megabytes: int = 0) -> list[Path]:
     return paths
 
 
-def test_more_memory_leaves_room_for_more_points_and_more_scans_for_fewer(tmp_path: Path):
+def test_room_for_points_by_memory_scans_and_formats(tmp_path: Path):
     few, many = files(tmp_path, 5), files(tmp_path, 20)
     small, large = 900 * MEGABYTE, 2000 * MEGABYTE
     assert MIN_POINTS <= points_within(small, many) < points_within(small, few)
     assert points_within(small, many) < points_within(large, many)
+    left = []
+    for suffix in (".ply", ".off"):
+        path = (tmp_path / "a").with_suffix(suffix)
+        with path.open("wb") as file:
+            file.truncate(30 * MEGABYTE)
+        left.append(points_within(1000 * MEGABYTE, [path] * 10))
+    assert left[0] > left[1] >= MIN_POINTS
 
 
 def test_too_little_memory_is_refused_with_what_is_needed(tmp_path: Path):
@@ -96,10 +103,17 @@ def test_a_thinned_scan_has_no_more_points_and_says_so(make: Callable[[], RangeS
     assert all(point.tobytes() in original for point in smaller.points)
 
 
-def test_a_small_scan_is_left_as_it_is():
+def test_a_small_scan_is_left_as_it_is_but_not_a_grid_of_empty_cells():
     scan = a_scan()
     assert thinned(bare(scan), len(scan.points)).notes == ()
     assert thinned(scan, 10 * len(scan.points)) is scan
+    assert scan.grid is not None and scan.grid.size > 4 * len(scan.points)
+    assert thinned(scan, len(scan.points)) is scan
+    wide = np.full((12 * len(scan.grid), scan.grid.shape[1]), -1)
+    wide[::12] = scan.grid
+    smaller = thinned(replace(scan, grid=wide, camera=None), len(scan.points))
+    assert smaller.grid is not None
+    assert smaller.grid.size <= 8 * len(scan.points) and len(smaller.points) > 100
 
 
 @pytest.mark.parametrize("model", [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC])
@@ -135,6 +149,10 @@ def test_moving_a_scan_does_not_change_what_stays():
     here, there = thinned(scan, 1000), thinned(moved(scan, motion), 1000)
     assert len(here.points) == len(there.points)
     np.testing.assert_allclose(motion.apply(here.points), there.points, atol=1e-6)
+    scan = replace(bare(a_scan()), confidence=np.arange(float(len(a_scan().points))))
+    smaller = thinned(scan, 700)
+    assert smaller.confidence is not None
+    np.testing.assert_array_equal(scan.points[smaller.confidence.astype(int)], smaller.points)
 
 
 def test_few_large_scans_leave_room_to_prepare_them(tmp_path: Path):
@@ -143,39 +161,9 @@ def test_few_large_scans_leave_room_to_prepare_them(tmp_path: Path):
     points = points_within(budget, files(tmp_path, 2))
     assert points < 600_000
     assert workers_within(budget, [points, points], 64) >= 2
-
-
-def test_what_is_thinned_takes_fewer_workers_the_larger_it_is():
-    budget = 1024 * MEGABYTE
     counts = [workers_within(budget, [points] * 10, 8) for points in (1000, 10**5, 10**6)]
     assert counts[0] == 8 and counts == sorted(counts, reverse=True) and counts[-1] == 1
     assert workers_within(budget, [1000], 1) == workers_within(budget, [], 1) == 1
-
-
-def test_formats_that_take_more_to_read_leave_less(tmp_path: Path):
-    left = []
-    for suffix in (".ply", ".off"):
-        path = (tmp_path / "a").with_suffix(suffix)
-        with path.open("wb") as file:
-            file.truncate(30 * MEGABYTE)
-        left.append(points_within(1000 * MEGABYTE, [path] * 10))
-    assert left[0] > left[1] >= MIN_POINTS
-
-
-def test_a_grid_with_an_empty_margin_is_not_thinned_for_it():
-    scan = a_scan()
-    assert scan.grid is not None and scan.grid.size > 4 * len(scan.points)
-    assert thinned(scan, len(scan.points)) is scan
-
-
-def test_a_grid_of_empty_cells_is_thinned():
-    scan = a_scan()
-    assert scan.grid is not None
-    wide = np.full((12 * len(scan.grid), scan.grid.shape[1]), -1)
-    wide[::12] = scan.grid
-    smaller = thinned(replace(scan, grid=wide, camera=None), len(scan.points))
-    assert smaller.grid is not None
-    assert smaller.grid.size <= 8 * len(scan.points) and len(smaller.points) > 100
 
 
 def test_points_are_thinned_evenly_to_about_what_there_is_room_for():
@@ -185,9 +173,6 @@ def test_points_are_thinned_evenly_to_about_what_there_is_room_for():
         assert 0.7 * most < len(smaller.points) <= most
         reach, _ = KDTree(smaller.points).query(ball)
         assert reach.max() < 3.0 * np.sqrt(4 * np.pi * 50.0**2 / len(smaller.points))
-
-
-def test_stray_points_do_not_make_the_cubes_large():
     points = np.random.default_rng(0).normal(size=(3000, 3)) * [30.0, 20.0, 4.0]
     points[-1] = [1e9, 0.0, 0.0]
     assert len(thinned(RangeScan(name="a", points=points), 500).points) > 250
@@ -199,13 +184,6 @@ def test_points_in_one_place_become_one(place: float):
     assert len(thinned(scan, 10).points) == 1
 
 
-def test_what_belongs_to_a_point_stays_with_it():
-    scan = replace(bare(a_scan()), confidence=np.arange(float(len(a_scan().points))))
-    smaller = thinned(scan, 700)
-    assert smaller.confidence is not None
-    np.testing.assert_array_equal(scan.points[smaller.confidence.astype(int)], smaller.points)
-
-
 @pytest.mark.slow
 def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -215,7 +193,7 @@ def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     config = Config(fusion=FusionConfig(max_voxels_across=60))
     monkeypatch.setattr(job, "points_within", lambda budget, paths: 1200)
     run_job([folder], tmp_path / "model", config, memory=10_000 * MEGABYTE, workers=1)
-    told = json.loads((tmp_path / "model" / "report.json").read_text())["scans"]
+    told = json.loads((tmp_path / "model" / "report.json").read_text(encoding="utf-8"))["scans"]
     assert told["large"]["num_points"] <= 1200
     assert any("thinned from" in note for note in told["large"]["notes"])
     assert not any("thinned" in note for note in told["scan_01"]["notes"])

@@ -139,9 +139,6 @@ def test_glb_is_what_its_specification_asks():
     )
     color = np.frombuffer(gltf(glb_bytes(grey))[1], "<f4", count=9, offset=36)
     assert color == pytest.approx([0] * 3 + [0.5029] * 3 + [1] * 3, abs=1e-3)
-
-
-def test_normals_of_no_length_become_some_unit_vector():
     mesh = TriangleMesh(vertices=np.eye(3), faces=np.array([[0, 1, 2]]), normals=np.zeros((3, 3)))
     normals = np.frombuffer(gltf(glb_bytes(mesh))[1], "<f4", count=9, offset=36).reshape(3, 3)
     assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)

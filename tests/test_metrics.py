@@ -49,11 +49,6 @@ def test_the_truth_is_right_in_any_frame():
     assert errors.count(Standing.RIGHT) == len(NAMES)
     assert errors.rotations_deg.max() < 1e-5
     assert errors.translations.max() < 1e-9
-
-
-def test_the_gauge_is_not_the_odd_one_out():
-    """Scan a, first of all, is turned by 20 degrees: it alone is wrong, by those 20 degrees."""
-    reference = reference_poses()
     estimate = {**reference, "a": reference["a"] @ turned(20)}
     errors = evaluate_poses(in_parts(estimate, NAMES), reference, diameter=1.0)
     assert errors.scans["a"].standing is Standing.WRONG
@@ -82,22 +77,16 @@ def test_each_component_has_its_own_gauge():
     assert together.count(Standing.WRONG) == 3
 
 
-def test_unplaced_and_foreign_scans():
+def test_unplaced_and_foreign_scans_nothing_placed_and_no_common_name():
     reference = reference_poses()
     estimate = {"a": reference["a"], "b": reference["b"], "stranger": Pose.identity()}
     errors = evaluate_poses(in_parts(estimate, tuple(estimate)), reference, diameter=1.0)
     assert errors.scans["stranger"].standing is Standing.WRONG
     assert errors.count(Standing.UNPLACED) == 4
     assert len(errors.rotations_deg) == 2
-
-
-def test_nothing_placed():
     errors = evaluate_poses(in_parts({}), reference_poses(), diameter=1.0)
     assert errors.count(Standing.UNPLACED) == len(NAMES)
     assert errors.translations_percent.size == 0
-
-
-def test_other_names_are_an_error():
     with pytest.raises(InputError, match="share no scan name"):
         evaluate_poses(in_parts({"x": Pose.identity()}, "x"), reference_poses())
 

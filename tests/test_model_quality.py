@@ -1,6 +1,5 @@
 """What a fused model says of itself, and what becomes of it: support, deviation, colours, holes."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -11,8 +10,7 @@ import pytest
 from benchmarks.surface.surface_defects import surface_defects
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.evaluation.primitives import plate, sphere
-from scanweld.evaluation.scanner import NoiseModel, scan_mesh
-from scanweld.evaluation.views import View, view_of
+from scanweld.evaluation.views import view_of
 from scanweld.fusion import fuse
 from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.color import exposure_gains
@@ -22,38 +20,14 @@ from scanweld.fusion.sheets import second_sheets, without_second_sheets
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals, smoothed_normals
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.prepared import PreparedScan
-from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_mesh, write_mesh_ply
 from scanweld.preparation import prepare
 from tests.meshes import is_closed, joined
+from tests.posed_scans import RADIUS, Posed, off_sphere, one_scan, scanned, views_of
 
-pytestmark = pytest.mark.slow
-
-RADIUS = 50.0
-SIDES = [(0, 0), (90, 0), (180, 0), (270, 0), (0, 89), (0, -89)]
-PIXELS = 110.0
 APART = np.array([32.0, 0.0, 0.0])
+FROM_ABOVE = [(0, 50), (120, 50), (240, 50), (0, 89)]
 OPEN = FusionConfig()
-Posed = tuple[list[PreparedScan], list[Pose]]
-
-
-def scanned(
-    mesh: TriangleMesh,
-    angles: Sequence[tuple[float, float]] = SIDES,
-    noise: Sequence[float] | float = 0.0,
-    pixels: float = PIXELS,
-) -> Posed:
-    views = [view_of(mesh, *a, pixels=pixels, model=CameraModel.ORTHOGRAPHIC) for a in angles]
-    sigmas = np.broadcast_to(noise, len(views)).tolist()
-    return [
-        prepare(one_scan(mesh, view, k, sigmas[k]), PrepareConfig()) for k, view in enumerate(views)
-    ], [view.world_from_sensor for view in views]
-
-
-def one_scan(mesh: TriangleMesh, view: View, k: int, sigma: float) -> RangeScan:
-    model = NoiseModel(depth_diameters=sigma)
-    return scan_mesh(mesh, view.camera, view.world_from_sensor, model, seed=k, name=f"scan_{k}")
 
 
 def images_of(scans: Posed) -> list[PosedImage]:
@@ -68,7 +42,7 @@ def ball(noise: float = 0.0) -> Posed:
 @lru_cache
 def cup() -> Posed:
     """A ball of which the lower part was not seen."""
-    return scanned(sphere(RADIUS), [(0, 50), (120, 50), (240, 50), (0, 89)])
+    return scanned(sphere(RADIUS), views_of(sphere(RADIUS), FROM_ABOVE))
 
 
 def border_points(mesh: TriangleMesh) -> np.ndarray:
@@ -107,7 +81,7 @@ def test_full_resolution_is_used_though_the_working_image_is_coarse():
 def test_support_counts_the_scans_that_see_a_place():
     """A plate under three cameras of which each sees another strip."""
     flat = plate(100.0, 80.0, 30.0)
-    scans, poses = scanned(flat, [(0, 89.9)] * 3)
+    scans, poses = scanned(flat, views_of(flat, [(0, 89.9)] * 3))
     limits = [-20.0, 0.0, 20.0]
     cut = []
     for scan, pose, limit in zip(scans, poses, limits, strict=True):
@@ -127,7 +101,7 @@ def test_support_counts_the_scans_that_see_a_place():
 def test_deviation_is_that_of_the_vertices(sigma: float):
     mesh = fuse(*ball(sigma), OPEN)
     assert mesh.stdev is not None and mesh.support is not None
-    error = np.linalg.norm(mesh.vertices, axis=1) - RADIUS
+    error = off_sphere(mesh.vertices)
     for count in (2, 3, 4):
         chosen = mesh.support == count
         if chosen.sum() < 300:
@@ -145,25 +119,24 @@ def test_each_scan_has_its_own_noise():
     others = np.delete(noise, 2)
     assert others.max() < 2.0 * others.min()
     assert 3.5 < noise[2] / np.median(others) < 9.0
-    error = np.linalg.norm(fuse(scans, poses, OPEN).vertices, axis=1) - RADIUS
-    even = np.linalg.norm(fuse(*ball(0.003), OPEN).vertices, axis=1) - RADIUS
+    error = off_sphere(fuse(scans, poses, OPEN).vertices)
+    even = off_sphere(fuse(*ball(0.003), OPEN).vertices)
     assert np.std(error) < 0.5 * np.std(even)
-
-
-def test_noise_of_a_lone_scan_is_that_of_its_pixels():
     scans, poses = ball(0.001)
     (alone,) = scan_noise(images_of((scans[:1], poses[:1])))
     together = scan_noise(images_of((scans, poses)))[0]
     assert 0.5 < alone / together < 2.0
 
 
-def test_walls_thinner_than_the_truncation_keep_both_sides():
-    """Three voxels thick, under noise: no sheet is lost, none is double."""
+@pytest.mark.parametrize(("noise", "off"), [(0.0, 0.3), (0.001, 0.7)])
+def test_walls_thinner_than_the_truncation_keep_both_sides(noise: float, off: float):
+    """Two or three voxels thick: no sheet is lost, none is double."""
     thin = plate(100.0, 80.0, 4.0)
-    scans, poses = scanned(thin, [(0, 89), (0, -89), (40, 60), (220, -60)], noise=0.001)
+    views = views_of(thin, [(0, 89), (0, -89), (40, 60), (220, -60)])
+    scans, poses = scanned(thin, views, noise)
     mesh = fuse(scans, poses, OPEN)
     inner = (np.abs(mesh.vertices[:, 0]) < 40) & (np.abs(mesh.vertices[:, 1]) < 30)
-    assert np.abs(np.abs(mesh.vertices[inner, 2]) - 2.0).max() < 0.7
+    assert np.abs(np.abs(mesh.vertices[inner, 2]) - 2.0).max() < off
     assert np.sign(mesh.vertices[inner, 2]).min() == -1 and mesh.vertices[inner, 2].max() > 0
     found = surface_defects(mesh, scans[0].resolution)
     assert (found.non_manifold, found.double, found.cracks) == (0, 0, 0)
@@ -244,7 +217,9 @@ def test_what_was_seen_empty_is_not_filled():
     """Two balls with a gap that was seen through: no membrane joins them."""
     one = sphere(25.0)
     pair = joined(*(replace(one, vertices=one.vertices + shift) for shift in (-APART, APART)))
-    scans, poses = scanned(pair, [(90, 10), (210, 10), (330, 10), (0, 89)], pixels=150.0)
+    scans, poses = scanned(
+        pair, views_of(pair, [(90, 10), (210, 10), (330, 10), (0, 89)], pixels=150.0)
+    )
     mesh = fuse(scans, poses, FusionConfig(holes="fill"))
     assert is_closed(mesh.faces)
     assert np.abs(mesh.vertices[:, 0]).min() > 4.0
@@ -261,13 +236,13 @@ def test_decimation_keeps_border_shape_and_colours():
     colored = replace(sphere(RADIUS), colors=np.full((len(sphere(RADIUS).vertices), 3), 0))
     red = colored.vertices[:, 0] > 0
     colored = replace(colored, colors=np.where(red[:, None], [220, 30, 30], [30, 30, 220]))
-    posed = scanned(colored, [(0, 50), (120, 50), (240, 50), (0, 89)])
+    posed = scanned(colored, views_of(colored, FROM_ABOVE))
     whole = fuse(*posed, OPEN)
     few = fuse(*posed, FusionConfig(faces=len(whole.faces) // 8))
     assert len(few.faces) < 1.05 * len(whole.faces) / 8
     np.testing.assert_allclose(border_points(few), border_points(whole), atol=1e-9 * RADIUS)
     voxel = posed[0][0].resolution
-    error = np.abs(np.linalg.norm(few.vertices, axis=1) - RADIUS)
+    error = np.abs(off_sphere(few.vertices))
     error[np.concatenate(border_edges(few.faces, len(few.vertices)))] = 0.0
     assert error.max() < 0.5 * voxel
     assert few.colors is not None
@@ -277,10 +252,10 @@ def test_decimation_keeps_border_shape_and_colours():
 
 
 def test_smoothing_takes_noise_away_and_keeps_size_and_border():
-    posed = scanned(sphere(RADIUS), [(0, 50), (120, 50), (240, 50), (0, 89)], noise=0.003)
+    posed = scanned(sphere(RADIUS), views_of(sphere(RADIUS), FROM_ABOVE), 0.003)
     rough, smooth = fuse(*posed, OPEN), fuse(*posed, FusionConfig(smooth=10))
     upper = [mesh.vertices[mesh.vertices[:, 2] > 0] for mesh in (rough, smooth)]
-    errors = [np.linalg.norm(points, axis=1) - RADIUS for points in upper]
+    errors = [off_sphere(points) for points in upper]
     assert np.std(errors[1]) < 0.9 * np.std(errors[0])
     assert abs(errors[1].mean() - errors[0].mean()) < 0.002 * RADIUS
     np.testing.assert_array_equal(border_points(smooth), border_points(rough))
@@ -289,7 +264,7 @@ def test_smoothing_takes_noise_away_and_keeps_size_and_border():
 def test_component_largest_leaves_one_piece():
     small = sphere(15.0)
     both = joined(sphere(RADIUS), replace(small, vertices=small.vertices + 3 * APART))
-    posed = scanned(both, [(90, 20), (210, 20), (330, 20)])
+    posed = scanned(both, views_of(both, [(90, 20), (210, 20), (330, 20)]))
     assert fuse(*posed, OPEN).vertices[:, 0].max() > 80
     largest = fuse(*posed, FusionConfig(component="largest"))
     assert largest.vertices[:, 0].max() < RADIUS + 3
@@ -321,10 +296,6 @@ def test_exposures_are_found_and_taken_out():
     np.testing.assert_allclose(relative / relative.mean(axis=0), 1.0, atol=0.02)
     ratio = mesh.colors / (100.0 + 35.0 * np.sin(mesh.vertices / 9.0))
     assert np.std(ratio) < 0.03
-
-
-def test_one_scan_without_colours_does_no_harm():
-    scans, poses = planted()
     scans[2] = replace(scans[2], scan=replace(scans[2].scan, colors=None))
     mesh = fuse(scans, poses, OPEN)
     assert mesh.colors is not None and np.std(mesh.colors.astype(float)) > 10
@@ -334,18 +305,11 @@ def test_properties_are_written(tmp_path: Path):
     mesh = fuse(*cup(), FusionConfig(holes="fill", faces=1500))
     write_mesh_ply(tmp_path / "model.ply", mesh)
     data = (tmp_path / "model.ply").read_bytes()
-    header, body = data.split(b"end_header\n", 1)
+    header = data.split(b"end_header\n", 1)[0]
     for line in (b"float nx", b"int support", b"float stdev", b"uchar filled"):
         assert b"property " + line in header
-    assert mesh.support is not None and mesh.stdev is not None and mesh.filled is not None
-    stride = (24 if b"double x" in header else 12) + 12 + 4 + 4 + 1
-    rows = np.frombuffer(body, np.uint8, stride * len(mesh.vertices)).reshape(-1, stride)
-    np.testing.assert_array_equal(rows[:, -1], mesh.filled)
-    stdev = np.frombuffer(rows[:, -5:-1].tobytes(), "<f4")
-    np.testing.assert_allclose(stdev, mesh.stdev, rtol=1e-6)
-    support = np.frombuffer(rows[:, -9:-5].tobytes(), "<i4")
-    np.testing.assert_array_equal(support, mesh.support)
     found = read_mesh(tmp_path / "model.ply")
+    assert mesh.support is not None and mesh.stdev is not None and mesh.filled is not None
     assert found.support is not None and found.stdev is not None and found.filled is not None
     assert len(found.faces) == len(mesh.faces)
     np.testing.assert_array_equal(found.support, mesh.support)

@@ -41,7 +41,11 @@ def test_all_files_are_there_and_strict(tmp_path: Path, result: Reconstruction):
     assert {path.name for path in tmp_path.iterdir()} == names
     for name in ("poses.json", "graph.json", "report.json"):
         assert load(tmp_path / name)["format"] == 1
-    assert Config(**tomllib.loads((tmp_path / "config.toml").read_text())) == result.config
+    assert (
+        Config(**tomllib.loads((tmp_path / "config.toml").read_text(encoding="utf-8")))
+        == result.config
+    )
+    assert np.array_equal(read_mesh(tmp_path / "model.ply").vertices, np.eye(3))
 
 
 def test_poses(tmp_path: Path, result: Reconstruction):
@@ -61,11 +65,8 @@ def test_graph(result: Reconstruction):
     keys = "i j kind accepted reason i_from_j score overlap evidence margin observability sliding"
     for pair in pairs:
         assert set(pair) == {*keys.split(), "confidence", "grounds", "alternatives", "passed_over"}
-    assert [(pair["i"], pair["j"]) for pair in pairs] == [
-        ("scan_1", "scan_2"),
-        ("scan_1", "scan_10"),
-        ("scan_10", "überzählig"),
-    ]
+    named = [("scan_1", "scan_2"), ("scan_1", "scan_10"), ("scan_10", "überzählig")]
+    assert [(pair["i"], pair["j"]) for pair in pairs] == named
     assert pairs[0]["evidence"] == dataclasses.asdict(EVIDENCE)
     rival = {"i_from_j": turned(2).matrix().tolist(), "score": 0.1, "weight": 0.25}
     assert pairs[0]["alternatives"][1] == rival
@@ -104,12 +105,9 @@ def test_nothing_placed_gives_no_model(tmp_path: Path):
     assert load(tmp_path / "report.json")["verdict"] == "nothing"
 
 
-def test_model_is_the_mesh(tmp_path: Path, result: Reconstruction):
-    write_outputs(result, tmp_path)
-    assert np.array_equal(read_mesh(tmp_path / "model.ply").vertices, np.eye(3))
-
-
-def test_order_of_the_records_does_not_change_the_bytes(tmp_path: Path, result: Reconstruction):
+def test_order_of_the_records_does_not_change_the_bytes_and_a_folder_must_be_there(
+    tmp_path: Path, result: Reconstruction
+):
     backwards = dataclasses.replace(
         result,
         poses=dict(reversed(list(result.poses.items()))),
@@ -121,9 +119,6 @@ def test_order_of_the_records_does_not_change_the_bytes(tmp_path: Path, result: 
         write_outputs(each, folder)
     for path in (tmp_path / "a").iterdir():
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
-
-
-def test_folder_that_is_not_there_is_an_error(tmp_path: Path, result: Reconstruction):
     with pytest.raises(WriteError, match="cannot be written"):
         write_outputs(result, tmp_path / "missing")
 
@@ -153,15 +148,9 @@ def test_summary_says_verdict_reasons_and_files(result: Reconstruction):
     assert lines[0] == "partial: 3 of 5 scans are placed"
     assert "  unplaced a: empty" in lines and "  unplaced überzählig: of another object" in lines
     assert lines[-1].startswith("  model: model.ply (3 vertices), report.html")
-
-
-def test_summary_of_several_components_names_them():
     result = dataclasses.replace(a_result(NAMES), components=(("scan_1", "scan_2"), ("scan_10",)))
     lines = summary(result, Path("model")).splitlines()
     assert lines[0].endswith("in 2 separate components")
     assert "  component 2: scan_10" in lines
-
-
-def test_summary_of_nothing_names_no_model():
     text = summary(a_result([], {"a": "x", "b": "y"}), Path("model"))
     assert text.startswith("nothing: no two of the 2 scans") and "model.ply" not in text

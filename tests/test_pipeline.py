@@ -98,7 +98,8 @@ def bytes_of(result: Reconstruction) -> list[bytes]:
 
 
 @pytest.mark.slow
-def test_all_scans_are_placed_exactly():
+def test_all_scans_are_placed_exactly_and_the_report_names_every_pair():
+    """The model's vertices lie on the object, in the frame of the component's first scan."""
     scene, result = creature(), creature_run()
     assert result.verdict is Verdict.GOOD and result.verdict.exit_code == 0
     assert len(result.components) == 1 and len(result.poses) == 6
@@ -106,22 +107,11 @@ def test_all_scans_are_placed_exactly():
     assert errors.count(Standing.RIGHT) == 6
     assert errors.rotations_deg.max() < 0.5
     assert errors.translations_percent.max() < 0.5
-
-
-@pytest.mark.slow
-def test_the_model_is_the_object():
-    """Its vertices lie on the object, in the frame of the component's first scan."""
-    scene, result = creature(), creature_run()
     assert result.mesh is not None
     posed = scene.world_from_scan[result.components[0][0]].apply(result.mesh.vertices)
     surface = scene.mesh.vertices[scene.mesh.faces].mean(axis=1)
     apart = np.array([np.linalg.norm(surface - p, axis=1).min() for p in posed[::50]])
     assert np.median(apart) < 0.015 * 210 and len(result.mesh.faces) > 1000
-
-
-@pytest.mark.slow
-def test_the_report_names_every_pair_and_stage():
-    result = creature_run()
     names = sorted(result.poses)
     every = [(a, b) for n, a in enumerate(names) for b in names[n + 1 :]]
     assert [(pair.i, pair.j) for pair in result.pairs] == every
@@ -251,14 +241,11 @@ def test_a_scan_in_another_unit_is_named():
     assert len(result.poses) == 2 and result.verdict is Verdict.PARTIAL
 
 
-def test_a_duplicate_is_kept_once_and_named():
+def test_a_duplicate_and_what_could_not_be_read_are_named():
     scans = list(few()[:2])
     result = run([replace(scans[0], name="zz_copy"), *scans])
     assert result.unplaced == {"zz_copy": "same content as scan_01, which is kept"}
     assert set(result.poses) == {"scan_01", "scan_02"}
-
-
-def test_what_could_not_be_read_is_named():
     scans = few()[:2]
     result = pipeline.run(scans, CONFIG, unreadable={"broken": "the file ends early"}, workers=1)
     assert result.unplaced == {"broken": "the file ends early"}
@@ -277,9 +264,6 @@ def test_fewer_than_two_usable_scans_are_an_error():
         assert "at least 2" in told and len(told.splitlines()) == 1
     with pytest.raises(InputError, match=r"dots: a scan of 10 points"):
         pipeline.run([scan, dots], CONFIG, workers=1)
-
-
-def test_two_scans_of_one_name_are_an_error():
     scans = [replace(scan, name="same") for scan in few()[:2]]
     with pytest.raises(InputError, match="same name"):
         pipeline.run(scans, CONFIG)

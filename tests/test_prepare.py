@@ -30,11 +30,11 @@ from tests.depth_scans import (
     scan_of_depth,
 )
 from tests.prepared import creature_pair, moved, scaled
-from tests.scenes import pair_at_gap, random_motion
+from tests.scenes import random_motion
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_the_image_of_a_ball_is_the_ball(model: CameraModel):
+def test_the_image_and_the_normals_of_a_ball_are_the_ball(model: CameraModel):
     scan, centre = ball(model)
     image = scan.image
     has = np.isfinite(image.depth)
@@ -49,12 +49,6 @@ def test_the_image_of_a_ball_is_the_ball(model: CameraModel):
         half_angle = np.arcsin(RADIUS / np.linalg.norm(centre))
         radius = np.median(image.depth[has]) * np.tan(half_angle)
     assert has.sum() * image.pixel**2 == pytest.approx(np.pi * radius**2, rel=0.06)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_normals_of_a_ball(model: CameraModel):
-    scan, centre = ball(model)
-    image = scan.image
     points = image.points()
     outward = (points - centre) / RADIUS
     facing = -np.einsum("hwk,hwk->hw", image.camera.view_directions(points), outward)
@@ -104,9 +98,6 @@ def test_the_surface_is_cut_at_a_jump_and_both_sides_are_rim():
         assert scan.image.is_rim[row, column]
     assert np.abs(scan.samples.points[:, 0] - 44.5).min() > 1.5
     np.testing.assert_allclose(scan.samples.normals, [[0, 0, -1]] * 800, atol=1e-9)
-
-
-def test_a_low_step_is_no_jump():
     scan = step(3.0)
     assert np.ptp(scan.mesh.vertices[scan.mesh.faces][..., 2], axis=1).max() == 3.0
     assert not scan.image.is_rim[round(45 + scan.image.camera.cy), round(45 + scan.image.camera.cx)]
@@ -122,7 +113,7 @@ def test_the_rim_surrounds_the_surface():
     assert 0.05 < image.is_rim[has].mean() < 0.6
 
 
-def test_tiny_pieces_are_dropped():
+def test_tiny_pieces_are_dropped_and_larger_ones_stay():
     depth = bumps()
     depth[4:7, 4:7] = 150.0
     depth[45:48, 45:48] = 120.0
@@ -130,9 +121,6 @@ def test_tiny_pieces_are_dropped():
     assert scan.mesh.vertices[:, 2].min() > 180
     assert kind_at(scan, 5, 5) is PixelKind.FREE
     assert kind_at(scan, 46, 46) is PixelKind.UNKNOWN
-
-
-def test_larger_pieces_stay():
     depth = bumps()
     depth[40:60, 40:60] = 120.0
     assert prepare(scan_of_depth(depth), CONFIG).mesh.vertices[:, 2].min() == pytest.approx(120)
@@ -174,10 +162,14 @@ def test_samples_lie_on_the_surface_off_the_rim_and_not_at_grazing_incidence():
     assert toward.min() > CONFIG.min_cosine
 
 
-def test_as_many_samples_as_asked_for():
+def test_as_many_samples_and_pixels_as_asked_for():
     scan = ball(MODELS[0])[0].scan
     assert len(prepare(scan, CONFIG).samples.points) == CONFIG.num_samples
     assert len(prepare(scan, PrepareConfig(num_samples=150)).samples.points) == 150
+    scan = creature_pair(30).scans[0].scan
+    coarse = prepare(scan, PrepareConfig(image_pixels=64))
+    assert coarse.image.pixel == pytest.approx(coarse.diameter / 64)
+    assert coarse.resolution < 0.8 * coarse.image.pixel
 
 
 def test_farthest_points_of_a_line():
@@ -222,13 +214,6 @@ def test_a_scan_without_a_grid_gives_the_same_surface(keeps: str):
     assert np.median(turn) < 12
 
 
-def test_a_fine_scan_is_thinned_to_the_working_resolution():
-    scan = creature_pair(30).scans[0].scan
-    coarse = prepare(scan, PrepareConfig(image_pixels=64))
-    assert coarse.image.pixel == pytest.approx(coarse.diameter / 64)
-    assert coarse.resolution < 0.8 * coarse.image.pixel
-
-
 @pytest.mark.parametrize("model", MODELS)
 def test_moving_a_scan_changes_nothing_seen_from_its_sensor(model: CameraModel):
     before = creature_pair(30, model).scans[0]
@@ -266,14 +251,7 @@ def test_the_content_hash_knows_content_not_name():
     assert replace(scan, points=points).content_hash() != scan.content_hash()
 
 
-def test_the_same_scan_gives_the_same_bytes():
-    scan = pair_at_gap(30, pixels=100)[0]
-    a, b = prepare(scan, CONFIG), prepare(scan, CONFIG)
-    assert a.samples.points.tobytes() == b.samples.points.tobytes()
-    assert a.image.normals.tobytes() == b.image.normals.tobytes()
-
-
-def test_a_scan_with_hardly_any_surface_is_refused():
+def test_a_scan_with_hardly_any_surface_or_points_is_refused():
     rng = np.random.default_rng(0)
     cloud = RangeScan(
         name="dust",
@@ -283,9 +261,6 @@ def test_a_scan_with_hardly_any_surface_is_refused():
     )
     with pytest.raises(InputError, match=r"^dust: only \d+ pixels of connected surface"):
         prepare(cloud, CONFIG)
-
-
-def test_a_scan_of_a_few_points_is_refused():
     depth = np.full((90, 90), np.nan)
     depth[40:43, 40:43] = 100
     with pytest.raises(InputError, match=r"^drawn: a scan of 9 points"):

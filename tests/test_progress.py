@@ -53,8 +53,10 @@ def refused(events: Sequence[Event]) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_stages_start_advance_and_finish_in_turn(told_run: tuple[list[Event], Reconstruction]):
-    events, _ = told_run
+def test_stages_start_and_finish_in_turn_and_scans_are_refused_as_it_happens(
+    told_run: tuple[list[Event], Reconstruction],
+):
+    events, result = told_run
     current, done, finished = "", 0, []
     for event in events:
         match event:
@@ -74,11 +76,6 @@ def test_stages_start_advance_and_finish_in_turn(told_run: tuple[list[Event], Re
     assert tuple(finished) == stages
     pairs = next(e for e in events if isinstance(e, StageFinished) and e.stage == "pairs")
     assert pairs.counts == {"pairs": 6}
-
-
-@pytest.mark.slow
-def test_scans_are_refused_once_and_as_it_happens(told_run: tuple[list[Event], Reconstruction]):
-    events, result = told_run
     told = refused(events)
     assert told == dict(result.unplaced) and {"large", "twice"} <= set(told)
     assert sum(isinstance(event, ScanRefused) for event in events) == len(told)
@@ -111,7 +108,7 @@ def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     lines: Told = [json.loads(line) for line in out.splitlines()]
     assert err == "" and lines[0] == {"event": "stage_started", "stage": "read"}
     end = lines.pop()
-    report = json.loads(Path("model/report.json").read_text())
+    report = json.loads(Path("model/report.json").read_text(encoding="utf-8"))
     assert end["event"] == "finished" and end["exit_code"] == code == 3
     assert all(end[key] == report[key] for key in ("verdict", "exit_code", "reasons"))
     assert (end["scans"], end["output"]) == (3, "model")
@@ -182,10 +179,7 @@ def test_every_event_is_documented():
 
 
 def test_names_of_any_kind_are_json():
-    line = event_line(ScanRefused(scan="a\nb\udcff\u2028", reason='"no"'))
+    name = "a\nb\udcff\u2028"
+    line = event_line(ScanRefused(scan=name, reason='"no"'))
     assert "\n" not in line and line.isascii()
-    assert json.loads(line) == {
-        "event": "scan_refused",
-        "scan": "a\nb\udcff\u2028",
-        "reason": '"no"',
-    }
+    assert json.loads(line) == {"event": "scan_refused", "scan": name, "reason": '"no"'}

@@ -35,10 +35,6 @@ def test_a_part_of_a_scan_keeps_what_belongs_to_its_points():
     np.testing.assert_array_equal(part.normals, np.eye(4)[1:, :3])
     np.testing.assert_array_equal(part.colors[:, 0], [3, 6, 9])
     np.testing.assert_array_equal(part.confidence, [1, 2, 3])
-
-
-def test_all_of_a_scan_is_the_scan():
-    scan = strip()
     assert scan.only(np.ones(4, dtype=bool)).content_hash() == scan.content_hash()
 
 

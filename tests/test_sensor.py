@@ -16,6 +16,7 @@ from scanweld.io import read_scan
 from scanweld.preparation.resolution import point_spacing
 from scanweld.preparation.sensor import locate_sensor
 from tests.data import require_data
+from tests.prepared import moved
 
 PINHOLE = Camera(
     model=CameraModel.PINHOLE, width=200, height=160, fx=220.0, fy=200.0, cx=95.0, cy=83.0
@@ -67,10 +68,6 @@ def organised(image: FloatArray, pose: Pose, name: str = "body") -> RangeScan:
 def any_pose(seed: int) -> Pose:
     rng = np.random.default_rng(seed)
     return Pose(rotation=random_rotation(rng), translation=rng.normal(scale=20, size=3))
-
-
-def moved(scan: RangeScan, pose: Pose) -> RangeScan:
-    return replace(scan, points=pose.apply(scan.points))
 
 
 def viewing(scan: RangeScan) -> FloatArray:
@@ -149,6 +146,7 @@ def test_line_scanner_is_seen_along_its_fan(oblique_deg: float):
     assert any("halfway" in note for note in found.notes) == (oblique_deg > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", BUNNY + DRAGON)
 def test_real_grids_give_the_viewing_direction_in_any_frame(path: str):
     """Truth: -z of the file; the bunny's rays lean by 3.4 deg, the dragon's camera by 28 deg."""
@@ -183,7 +181,7 @@ def test_estimate_turns_with_the_points_and_ignores_the_unit():
     assert angle_deg(viewing(turned), pose.turn(viewing(found))) < 1.0
 
 
-def test_winding_of_an_open_mesh_tells_the_side():
+def test_winding_of_an_open_mesh_and_normals_tell_the_side():
     """A hollow bowl falls off the wrong way; its winding knows better, and the doubt is told."""
     scan = organised(render(ORTHOGRAPHIC), pose := any_pose(11))
     assert scan.grid is not None
@@ -194,21 +192,26 @@ def test_winding_of_an_open_mesh_tells_the_side():
     assert angle_deg(viewing(hollow), -pose.rotation[:, 2]) < 10
     assert any("contradict" in note for note in hollow.notes)
     assert not any("contradict" in note for note in front.notes)
-
-
-def test_normals_of_the_file_tell_the_side():
     scan = organised(render(ORTHOGRAPHIC), pose := any_pose(12))
     normals = np.tile(pose.rotation[:, 2], (len(scan.points), 1))
     found = locate_sensor(replace(scan, grid=None, normals=normals))
     assert angle_deg(viewing(found), -pose.rotation[:, 2]) < 10
 
 
-def test_complete_model_is_called_one():
+def test_complete_model_is_called_one_and_what_is_no_surface_refused():
     rng = np.random.default_rng(0)
     sphere = rng.normal(size=(4000, 3)) * (1.0, 1.2, 0.8)
     sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
     found = locate_sensor(RangeScan(name="sphere", points=sphere))
     assert any("complete model" in note for note in found.notes)
+    points = np.random.default_rng(0).normal(size=(10, 3))
+    with pytest.raises(InputError, match="few: a scan of 10 points"):
+        locate_sensor(RangeScan(name="few", points=points))
+    line = np.linspace(0, 1, 100)[:, None] * np.array([1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="one line"):
+        locate_sensor(RangeScan(name="line", points=line))
+    with pytest.raises(InputError, match="one line"):
+        locate_sensor(RangeScan(name="dot", points=np.ones((100, 3))))
 
 
 def test_flat_scan_is_seen_squarely_and_its_side_called_a_guess():
@@ -230,16 +233,13 @@ def test_grid_that_does_not_fit_its_points_is_not_believed():
     found = locate_sensor(replace(scan, grid=grid))
     assert found.viewpoint is Viewpoint.ESTIMATED and found.camera is None
     assert angle_deg(viewing(found), pose.rotation[:, 2]) < 10
-
-
-def test_grid_of_one_row_or_one_point_is_not_believed():
     scan = replace(organised(render(PINHOLE), any_pose(8)), grid=None)
     row = np.arange(len(scan.points))[None]
     for grid in (row, np.zeros((20, 20), dtype=int), np.full((20, 20), -1)):
         assert locate_sensor(replace(scan, grid=grid)).viewpoint is Viewpoint.ESTIMATED
 
 
-def test_given_sensor_is_kept():
+def test_given_sensor_is_kept_and_one_without_a_camera_stands_well_before_the_object():
     given_scan = replace(
         organised(render(PINHOLE), Pose.identity()),
         camera=PINHOLE,
@@ -247,6 +247,11 @@ def test_given_sensor_is_kept():
         viewpoint=Viewpoint.GIVEN,
     )
     assert locate_sensor(given_scan) is given_scan
+    scan = replace(organised(render(PINHOLE), any_pose(6)), grid=None)
+    found = locate_sensor(scan)
+    assert found.scan_from_sensor is not None
+    distance = np.linalg.norm(found.scan_from_sensor.translation - scan.points.mean(axis=0))
+    assert distance == pytest.approx(2 * principal_diameter(scan.points))
 
 
 @pytest.mark.parametrize("has_grid", [True, False])
@@ -260,25 +265,6 @@ def test_camera_without_a_pose_holds_only_where_the_points_fit_it(has_grid: bool
     away = locate_sensor(moved(scan, pose))
     assert angle_deg(viewing(away), pose.rotation[:, 2]) < (1e-5 if has_grid else 10)
     assert (away.camera is not None) == has_grid
-
-
-def test_what_is_no_surface_is_refused():
-    points = np.random.default_rng(0).normal(size=(10, 3))
-    with pytest.raises(InputError, match="few: a scan of 10 points"):
-        locate_sensor(RangeScan(name="few", points=points))
-    line = np.linspace(0, 1, 100)[:, None] * np.array([1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match="one line"):
-        locate_sensor(RangeScan(name="line", points=line))
-    with pytest.raises(InputError, match="one line"):
-        locate_sensor(RangeScan(name="dot", points=np.ones((100, 3))))
-
-
-def test_sensor_without_a_camera_stands_well_before_the_object():
-    scan = replace(organised(render(PINHOLE), any_pose(6)), grid=None)
-    found = locate_sensor(scan)
-    assert found.scan_from_sensor is not None
-    distance = np.linalg.norm(found.scan_from_sensor.translation - scan.points.mean(axis=0))
-    assert distance == pytest.approx(2 * principal_diameter(scan.points))
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e5])

@@ -105,9 +105,6 @@ def test_a_table_in_most_scans_is_left_out_of_these():
     prepared = taken_in(scans).prepared
     without = {scan.name for scan in prepared if scan.is_without_support}
     assert without == {"at 0", "at 90", "at 180"}
-
-
-def test_a_plane_in_few_scans_belongs_to_the_object():
     scans = [seen(small_creature(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
     scans.append(seen(on_table(), 270.0))
     assert not any(scan.is_without_support for scan in taken_in(scans).prepared)
