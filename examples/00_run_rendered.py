@@ -4,13 +4,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import scanweld
-from scanweld.evaluation.creature import creature
-from scanweld.evaluation.simulate import simulate
 
 
 def run_rendered(folder: Path) -> None:
     """Scan a creature from five sides, then register and fuse the scans."""
-    simulate(creature(voxels=70), folder / "scans", num_scans=5, pixels=140)
+    scanweld.simulate(scanweld.creature(voxels=70), folder / "scans", num_scans=5, pixels=140)
 
     scans = scanweld.read_scans(folder / "scans")
     result = scanweld.run(scans)

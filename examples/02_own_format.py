@@ -6,8 +6,7 @@ the sensor stood. Points alone do too; then scanweld estimates the viewpoint, an
 
 import numpy as np
 
-from scanweld import Camera, CameraModel, Pose, RangeScan, Viewpoint
-from scanweld.app.info import describe_scan
+from scanweld import Camera, CameraModel, Pose, RangeScan, Viewpoint, describe_scan
 
 CAMERA = Camera(model=CameraModel.PINHOLE, width=96, height=80, fx=120, fy=120, cx=47.5, cy=39.5)
 

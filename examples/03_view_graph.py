@@ -5,8 +5,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import scanweld
-from scanweld.evaluation.creature import creature
-from scanweld.evaluation.simulate import simulate
 
 
 def show_pairs(scans: Sequence[scanweld.RangeScan]) -> None:
@@ -22,5 +20,7 @@ def show_pairs(scans: Sequence[scanweld.RangeScan]) -> None:
 
 if __name__ == "__main__":
     with TemporaryDirectory() as folder:
-        simulate(creature(voxels=70), Path(folder) / "scans", num_scans=5, pixels=140)
+        scanweld.simulate(
+            scanweld.creature(voxels=70), Path(folder) / "scans", num_scans=5, pixels=140
+        )
         show_pairs(scanweld.read_scans(Path(folder) / "scans"))

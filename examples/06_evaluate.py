@@ -6,9 +6,6 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import scanweld
-from scanweld.app.comparison import compare, comparison_table
-from scanweld.evaluation.creature import creature
-from scanweld.evaluation.simulate import simulate
 
 
 def disturbed(truth: scanweld.PoseSet, seed: int = 0) -> scanweld.PoseSet:
@@ -28,9 +25,9 @@ def disturbed(truth: scanweld.PoseSet, seed: int = 0) -> scanweld.PoseSet:
 if __name__ == "__main__":
     with TemporaryDirectory() as name:
         folder = Path(name)
-        truth = simulate(creature(voxels=70), folder / "scans", num_scans=5, pixels=60)
-        scanweld.write_poses(folder / "poses.json", disturbed(truth))
-        errors = compare(
-            folder / "poses.json", folder / "scans/truth/poses.json", [folder / "scans"]
+        truth = scanweld.simulate(
+            scanweld.creature(voxels=70), folder / "scans", num_scans=5, pixels=60
         )
-        print(comparison_table(errors))
+        scans = scanweld.read_scans(folder / "scans")
+        errors = scanweld.evaluate(disturbed(truth), truth.poses, scans)
+        print(scanweld.comparison_table(errors))

@@ -11,9 +11,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from scanweld import write_mesh_ply
-from scanweld.app.cli import main
-from scanweld.evaluation.creature import creature
+from scanweld import creature, write_mesh_ply
+from scanweld.app.cli import main  # the commands themselves, as the shell runs them
 
 
 def demo(folder: Path) -> int:

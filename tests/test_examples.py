@@ -53,6 +53,13 @@ def test_view_graph(capsys: pytest.CaptureFixture[str]):
     assert len(re.findall(r"^component in the frame of ", text, re.MULTILINE)) == 1
 
 
+def test_correct_and_resume(capsys: pytest.CaptureFixture[str]):
+    text = output_of("04_correct_and_resume.py", capsys)
+    assert text.startswith("first good: 4 scans are placed")
+    assert number(r"(\d+) pieces of work were found again", text) == 4 + 6
+    assert re.search(r"apart scan_\d\d scan_\d\d: contradicted", text)
+
+
 def test_fuse_known_poses(capsys: pytest.CaptureFixture[str]):
     assert number(r"(\d+) faces", output_of("05_fuse_known_poses.py", capsys)) > 5000
 

@@ -1,6 +1,7 @@
 """scanweld: unordered range scans of an object to one registered, fused model and a verdict.
 
-In short: ``scanweld.run(scanweld.read_scans("scans/"))``.
+In short: ``scanweld.run(scanweld.read_scans("scans/"))``. One stage alone: ``prepare``,
+``register_pair``, ``refine``, ``fuse``, ``evaluate``.
 """
 
 from importlib.metadata import version
@@ -10,6 +11,8 @@ from scanweld.work import (
 )
 
 # isort: split
+from scanweld.app.comparison import comparison_table
+from scanweld.app.info import describe_scan
 from scanweld.config import Config, load_config
 from scanweld.errors import (
     ConfigError,
@@ -19,11 +22,14 @@ from scanweld.errors import (
     ScanweldError,
     WriteError,
 )
-from scanweld.evaluation.metrics import evaluate_poses
+from scanweld.evaluation.creature import creature
+from scanweld.evaluation.metrics import PoseErrors, evaluate
+from scanweld.evaluation.simulate import simulate
 from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io import (
     PoseSet,
@@ -37,6 +43,7 @@ from scanweld.io import (
 from scanweld.io.scans import read_scans
 from scanweld.knowledge.facts import Knowledge, read_knowledge
 from scanweld.pairs.result import PairKind
+from scanweld.pipeline.one_stage import fuse, prepare, refine, register_pair
 from scanweld.pipeline.run import run
 from scanweld.reconstruction import (
     FactReport,
@@ -66,7 +73,9 @@ __all__ = [
     "PairKind",
     "PairReport",
     "Pose",
+    "PoseErrors",
     "PoseSet",
+    "PreparedScan",
     "RangeScan",
     "ReadError",
     "Reconstruction",
@@ -81,14 +90,22 @@ __all__ = [
     "Verdict",
     "Viewpoint",
     "WriteError",
-    "evaluate_poses",
+    "comparison_table",
+    "creature",
+    "describe_scan",
+    "evaluate",
+    "fuse",
     "load_config",
+    "prepare",
     "read_knowledge",
     "read_mesh",
     "read_poses",
     "read_scan",
     "read_scans",
+    "refine",
+    "register_pair",
     "run",
+    "simulate",
     "write_mesh_ply",
     "write_poses",
     "write_scan_ply",

@@ -10,9 +10,7 @@ from scanweld.evaluation.metrics import (
     PoseErrors,
     ScanError,
     Standing,
-    evaluate_poses,
-    object_diameter,
-    scan_centroids,
+    evaluate,
 )
 from scanweld.io import collect, natural_key, read_poses, read_scan
 
@@ -34,17 +32,12 @@ def compare(
     reference = read_poses(truth).poses
     found = read_poses(estimate)
     if not scans:
-        return evaluate_poses(found, reference)
+        return evaluate(found, reference)
     files = {file.name: file.path for file in collect(scans) if file.name in reference}
     if missing := sorted(set(reference) & set(found.poses) - set(files), key=natural_key):
         raise InputError(f"{missing[0]}: has a pose but is not among the scans given")
     read = [read_scan(path, name) for name, path in files.items()]
-    return evaluate_poses(
-        found,
-        reference,
-        centroids=scan_centroids(read),
-        diameter=object_diameter(read, reference),
-    )
+    return evaluate(found, reference, read)
 
 
 def comparison_table(errors: PoseErrors) -> str:

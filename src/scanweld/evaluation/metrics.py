@@ -1,6 +1,6 @@
 """Pose errors against a reference, and which scans are right, wrong or unplaced."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -77,6 +77,31 @@ class PoseErrors:
     def _placed(self, field: str) -> FloatArray:
         values = np.array([getattr(self.scans[name], field) for name in sorted(self.scans)])
         return values[np.isfinite(values)]
+
+
+def evaluate(
+    estimate: PoseSet, reference: Mapping[str, Pose], scans: Sequence[RangeScan] = ()
+) -> PoseErrors:
+    """Compare estimated poses with reference poses, see ``evaluate_poses``.
+
+    Args:
+        estimate: Poses of the placed scans, each component in a frame of its own.
+        reference: world_from_scan that poses are held against.
+        scans: The scans themselves, if at hand: then translations are taken at their centroids and
+            also given in percent of the object's diameter.
+
+    Raises:
+        InputError: If the two have no scan in common.
+    """
+    if not scans:
+        return evaluate_poses(estimate, reference)
+    known = [scan for scan in scans if scan.name in reference]
+    return evaluate_poses(
+        estimate,
+        reference,
+        centroids=scan_centroids(known),
+        diameter=object_diameter(known, reference),
+    )
 
 
 def evaluate_poses(

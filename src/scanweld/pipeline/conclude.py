@@ -65,7 +65,7 @@ def conclude(
             sorted(
                 (
                     _with_confidence(
-                        _pair_report(prepared, graph, edge, config), confidence.pairs.get(edge)
+                        pair_report(prepared, graph, edge, config), confidence.pairs.get(edge)
                     )
                     for edge in graph.pairs
                 ),
@@ -189,9 +189,10 @@ def _camera_words(camera: Camera | None) -> str | None:
     return f"{camera.model.name.lower()} {camera.width} x {camera.height}"
 
 
-def _pair_report(
+def pair_report(
     prepared: Sequence[PreparedScan], graph: ViewGraph, edge: tuple[int, int], config: Config
 ) -> PairReport:
+    """What became of a pair of a view graph, with poses between the scans' own frames."""
     result = graph.pairs[edge]
     chosen = graph.accepted.get(edge) or result.best
     options = (*result.alternatives, *result.further_ties)

@@ -1,6 +1,6 @@
 """Draw the README's picture from the demo's folder: left the heap of scans, right the model.
 
-python examples/readme_picture.py demo docs/heap-to-model.png
+python docs/readme_picture.py demo docs/heap-to-model.png
 """
 
 import colorsys
