@@ -8,18 +8,17 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
 
-# On all cores; whole files go to a worker, as their tests share scenes.
-PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile
+# One process a core. Tests that lie together stay together, since they share their scenes.
+PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal --durations 10
 
-# All tests of the package.
 test: $(VENV)/.installed-dev
 	$(PYTEST) --ignore tests/benchmarks
 
-# Without whole runs: what to run while working.
+# Without runs of the whole pipeline and of other processes: for every change.
 test-fast: $(VENV)/.installed-dev
 	$(PYTEST) --ignore tests/benchmarks -m "not slow"
 
-# What benchmarks compute and write, in their quick forms.
+# What tests the code in benchmarks/, which needs more packages.
 test-benchmarks: $(VENV)/.installed-bench
 	$(PYTEST) tests/benchmarks
 
@@ -32,13 +31,10 @@ lint: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-docs
 	$(BIN)/mkdocs build --strict
 
-# The numbers of README.md and docs/benchmarks.md; needs the Stanford data, takes a quarter of an hour.
+# The numbers of README.md, docs/benchmarks.md and docs/model.md; needs the Stanford data, takes a
+# quarter of an hour. Small and without the data: make benchmarks BENCHMARKS="--quick --out bench"
 benchmarks: $(VENV)/.installed-bench
-	$(BIN)/python benchmarks/run.py --seeds 3 --out docs/data/sets.json
-	$(BIN)/python benchmarks/pairs.py --seeds 3 --keypoints heat even mixed --out docs/data/pairs.json --plot docs/pairs.png
-	$(BIN)/python benchmarks/keypoints.py --out docs/data/keypoints.json
-	$(BIN)/python benchmarks/model.py --out docs/data/model.json
-	$(BIN)/python benchmarks/pages.py
+	$(BIN)/python -m benchmarks $(BENCHMARKS)
 
 # The paper's tables and figures beside ours, into docs/paper; needs the Stanford data, takes up to
 # an hour on 2 cores, and goes on where it was stopped. In two minutes and without the data:
@@ -47,7 +43,8 @@ paper: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.paper $(PAPER)
 
 # What it asserts under hard conditions, held against the truth, into docs/trust.md; up to an hour
-# on 2 cores, and goes on where it was stopped. A handful of runs: make trust TRUST="--quick --out trust"
+# on 2 cores, and goes on where it was stopped. Which seeds it may take: benchmarks/SEEDS.md. Only to
+# see that it works: make trust TRUST="--quick --out trust"
 trust: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.trust --compare $(TRUST)
 

@@ -1,19 +1,18 @@
-"""Paired differences between two results of ``benchmarks/run.py``: B - A over sets and seeds.
+"""Paired differences between two results of ``benchmarks.run``: B - A over sets and seeds.
 
-python benchmarks/compare.py A.json B.json
+python -m benchmarks.compare A.json B.json
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean, stdev
-from typing import Any
 
-from results import read_results
+from benchmarks.blocks import markdown_table
+from benchmarks.results import read_results
+from benchmarks.run import COLUMNS
 
-METRICS = (
-    *("right", "wrong", "rotation_mean", "rotation_max"),
-    *("translation_mean", "translation_max", "seconds", "cpu_seconds", "peak_mb"),
-)
+METRICS = ("right", "wrong", *(key for key, *_ in COLUMNS))
 
 
 def main() -> int:
@@ -21,21 +20,18 @@ def main() -> int:
     if len(sys.argv) != 3:
         print(__doc__, file=sys.stderr)
         return 2
-    a, b = (_runs(Path(argument)) for argument in sys.argv[1:])
-    print("| set | runs | " + " | ".join(METRICS) + " |")
-    print("|" + "---|" * (len(METRICS) + 2))
+    documents = (read_results(Path(argument)) for argument in sys.argv[1:])
+    a, b = ({(r["set"], r["seed"]): r for r in document["records"]} for document in documents)
+    rows = []
     for name in dict.fromkeys(name for name, _ in a):
         both = [key for key in a if key[0] == name and key in b]
-        cells = [_difference([(a[key].get(m), b[key].get(m)) for key in both]) for m in METRICS]
-        print(f"| {name} | {len(both)} | " + " | ".join(cells) + " |")
+        told = [difference([(a[key].get(m), b[key].get(m)) for key in both]) for m in METRICS]
+        rows.append((name, len(both), *told))
+    print(markdown_table(("set", "runs", *METRICS), rows), end="")
     return 0
 
 
-def _runs(path: Path) -> dict[tuple[str, int], dict[str, Any]]:
-    return {(run["set"], run["seed"]): run for run in read_results(path)["records"]}
-
-
-def _difference(pairs: list[tuple[float | None, float | None]]) -> str:
+def difference(pairs: Sequence[tuple[float | None, float | None]]) -> str:
     """Mean of B - A and its spread over the runs that both have."""
     differences = [b - a for a, b in pairs if a is not None and b is not None]
     if not differences:

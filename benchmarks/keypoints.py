@@ -1,6 +1,7 @@
 """How repeatable PA-HKS keypoints are between virtual views of a mesh, as a Markdown table.
 
-    python benchmarks/keypoints.py [MESH ...] --out keypoints.json
+    python -m benchmarks.keypoints [MESH ...] --out keypoints.json
+    python -m benchmarks.keypoints --quick
 
 A keypoint is repeated if the other view, which sees its place, has a keypoint within 3 % of the
 diameter of it. The chance level is the share of evenly spread samples for which that holds. Recall
@@ -9,17 +10,18 @@ at 8 is the share of repeated keypoints whose partner is among the 8 nearest sig
 
 import argparse
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
-from typing import Any
 
 import numpy as np
-import trimesh
 
-from results import write_results
+from benchmarks.blocks import markdown_table
+from benchmarks.results import Json, write_results
+from benchmarks.sets import data_folder
 from scanweld.config import HeatConfig, PrepareConfig
+from scanweld.evaluation.creature import creature
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import Axis, view_of
 from scanweld.geometry.arrays import BoolArray, FloatArray
@@ -27,18 +29,22 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat import Features, describe
+from scanweld.io import read_mesh
 from scanweld.preparation import prepare
-from sets import data_folder
 
 GAPS_DEG = (30, 50, 70, 90)
 AZIMUTHS_DEG = (0, 90, 180, 270)
 ELEVATION_DEG = 10
 RADIUS_DIAMETERS = 0.03
 NEAREST = 8
-COLUMNS = ("keypoints", "repeated", "repeated_chance", "recall", "recall_chance", "seconds")
-HEADINGS = (
-    *("mesh", "gap (deg)", "keypoints", "repeated", "chance", "recall at 8", "chance", "seconds"),
-)
+COLUMNS = {
+    "keypoints": "keypoints",
+    "repeated": "repeated",
+    "repeated_chance": "chance",
+    "recall": "recall at 8",
+    "recall_chance": "chance",
+    "seconds": "seconds",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,79 +62,84 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("meshes", nargs="*", type=Path, help="default: those of the data")
     parser.add_argument("--up", default="y", choices=["x", "y", "z"])
+    parser.add_argument("--quick", action="store_true", help="two views of a made object")
     parser.add_argument("--out", type=Path, help="JSON file of all comparisons of two views")
-    arguments = parser.parse_args()
-    data = data_folder(None) / "meshes"
-    meshes = arguments.meshes or [data / "armadillo.ply", data / "bunny.ply"]
-    compared = [one for path in meshes for one in comparisons(path, arguments.up)]
-    if arguments.out:
-        write_results(arguments.out, compared)
-    print("\n".join(table(compared)))
+    options = parser.parse_args()
+    if options.quick:
+        compared = comparisons("creature", creature(voxels=80), "z", (0,), (30,))
+    else:
+        data = data_folder(None) / "meshes"
+        paths = options.meshes or [data / "armadillo.ply", data / "bunny.ply"]
+        compared = [c for p in paths for c in comparisons(p.stem, read_mesh(p), options.up)]
+    if options.out:
+        write_results(options.out, compared)
+    print(table(compared), end="")
 
 
-def comparisons(path: Path, up: Axis) -> list[dict[str, Any]]:
+def comparisons(
+    name: str,
+    mesh: TriangleMesh,
+    up: Axis,
+    azimuths_deg: Sequence[float] = AZIMUTHS_DEG,
+    gaps_deg: Sequence[float] = GAPS_DEG,
+) -> list[Json]:
     """Both directions of all pairs of views of a mesh."""
-    loaded = trimesh.load_mesh(path, process=False)
-    mesh = TriangleMesh(vertices=loaded.vertices, faces=loaded.faces)
     found = []
-    for azimuth in AZIMUTHS_DEG:
+    for azimuth in azimuths_deg:
         first = look(mesh, azimuth, up)
-        for gap in GAPS_DEG:
+        for gap in gaps_deg:
             second = look(mesh, azimuth + gap, up)
             for i, j in ((first, second), (second, first)):
-                found.append(
-                    {"mesh": path.stem, "azimuth": azimuth, "gap": gap, **compare(i, j)}
-                    | {"keypoints": len(j.features.points), "seconds": second.seconds}
-                )
+                cost = {"keypoints": len(j.features.points), "seconds": second.seconds}
+                of = {"mesh": name, "azimuth": azimuth, "gap": gap}
+                found.append({**of, **compare(i, j), **cost})
     return found
 
 
-def table(compared: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Markdown lines: means for each mesh and gap."""
-    lines = [f"| {' | '.join(HEADINGS)} |", "|" + "---|" * len(HEADINGS)]
+def table(compared: Sequence[Json]) -> str:
+    """Markdown: means for each mesh and gap."""
+    rows = []
     for mesh, gap in dict.fromkeys((c["mesh"], c["gap"]) for c in compared):
         of = [c for c in compared if (c["mesh"], c["gap"]) == (mesh, gap)]
-        cells = [f"{mean(c[k] for c in of if c[k] is not None):.2f}" for k in COLUMNS]
-        lines.append(f"| {mesh} | {gap} | {' | '.join(cells)} |")
-    return lines
+        known = ([c[key] for c in of if c[key] is not None] for key in COLUMNS)
+        rows.append((mesh, gap, *(f"{mean(values):.2f}" if values else "-" for values in known)))
+    return markdown_table(("mesh", "gap (deg)", *COLUMNS.values()), rows)
 
 
 def look(mesh: TriangleMesh, azimuth_deg: float, up: Axis) -> Seen:
     """A view whose camera is rolled by an angle that depends on the azimuth."""
     view = view_of(mesh, azimuth_deg, ELEVATION_DEG, 137.0 * azimuth_deg % 360, up=up)
-    scan = prepare(scan_mesh(mesh, view.camera, view.world_from_sensor), PrepareConfig())
+    pose = view.world_from_sensor
+    scan = prepare(scan_mesh(mesh, view.camera, pose), PrepareConfig())
     start = time.perf_counter()
     features = describe(scan, HeatConfig())
     seconds = time.perf_counter() - start
-    return Seen(
-        world_from_sensor=view.world_from_sensor, scan=scan, features=features, seconds=seconds
-    )
+    return Seen(world_from_sensor=pose, scan=scan, features=features, seconds=seconds)
 
 
 def compare(i: Seen, j: Seen) -> dict[str, float | None]:
     """Repeatability of i's keypoints in j and recall at 8, each with its chance level."""
     j_from_i = j.world_from_sensor.inverse() @ i.world_from_sensor
-    radius = RADIUS_DIAMETERS * j.scan.diameter
     points = j_from_i.apply(i.features.points)
-    is_near = near(points, j.features.points, radius) & is_seen(points, j.scan)[:, None]
     samples = j_from_i.apply(i.scan.samples.points)
     samples = samples[is_seen(samples, j.scan)]
-    chance = float(np.mean(near(samples, j.features.points, radius).any(axis=1)))
+    is_near = near(points, j) & is_seen(points, j.scan)[:, None]
     repeated: BoolArray = np.any(is_near, axis=1)
     apart = np.linalg.norm(i.features.signatures[:, None] - j.features.signatures[None], axis=-1)
     among = np.argsort(apart, axis=1, kind="stable")[:, :NEAREST]
     is_found: BoolArray = np.any(np.take_along_axis(is_near, among, axis=1), axis=1)
     return {
         "repeated": float(repeated.sum() / is_seen(points, j.scan).sum()),
-        "repeated_chance": chance,
+        "repeated_chance": float(np.mean(near(samples, j).any(axis=1))),
         "recall": float(np.mean(is_found[repeated])) if repeated.any() else None,
         "recall_chance": NEAREST / len(j.features.points),
     }
 
 
-def near(points: FloatArray, others: FloatArray, radius: float) -> BoolArray:
-    """Which of the others (M,) are near which points (N,): (N, M)."""
-    return np.linalg.norm(points[:, None] - others[None], axis=-1) < radius
+def near(points: FloatArray, seen: Seen) -> BoolArray:
+    """Which of a view's M keypoints are near which points (N, 3), sensor frame: (N, M)."""
+    away = np.linalg.norm(points[:, None] - seen.features.points[None], axis=-1)
+    return away < RADIUS_DIAMETERS * seen.scan.diameter
 
 
 def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:

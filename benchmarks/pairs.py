@@ -1,7 +1,8 @@
 """Register pairs of real scans alone, each from any start pose, and see what can be trusted.
 
-    python benchmarks/pairs.py --seeds 1 --out pairs.json --plot pairs.png
-    python benchmarks/pairs.py --keypoints heat even mixed
+    python -m benchmarks.pairs --seeds 1 --out pairs.json --plot pairs.png
+    python -m benchmarks.pairs --keypoints heat even mixed
+    python -m benchmarks.pairs --quick
 
 All 45 pairs of the bunny and all of the dragon up to 96 degrees apart. Every scan is first moved by
 a random rotation and shift, and its grid turned by a random number of quarter turns. The first
@@ -14,16 +15,20 @@ import argparse
 import csv
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise, product
+from itertools import combinations, pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata
 
-from results import write_results
+from benchmarks.blocks import judged, markdown_table
+from benchmarks.results import write_results
+from benchmarks.scores import Stated
+from benchmarks.sets import BUNNY, data_folder, dragon, moved_scans
+from benchmarks.virtual.bodies import make_body
+from benchmarks.virtual.shots import SLIGHT, ring, shot_overlaps, take_shots
 from scanweld.config import Config, PairsConfig
 from scanweld.contours.coherence import contour_matcher
 from scanweld.evaluation.metrics import (
@@ -34,43 +39,31 @@ from scanweld.evaluation.metrics import (
 from scanweld.evidence.field import make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import describe
 from scanweld.io import read_poses, read_scan
-from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pipeline.robust import pair_registrar
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
-from sets import BUNNY, data_folder, dragon, moved_scans
-
-Keypoints = Literal["mixed", "heat", "even"]
 
 OBJECTS = {
     "bunny": ("stanford-bunny", BUNNY, 360.0),
     "dragon": ("stanford-dragon", dragon(24), 97.0),
 }
 """Object -> folder, scans, largest rotation between the scans of a pair in degrees."""
-NEAR_ROTATION_DEG = 10.0
-NEAR_TRANSLATION_PERCENT = 5.0
-BINS = ((0.15, 1.01), (0.10, 0.15), (0.05, 0.10), (0.0, 0.05))
-FLOORS = {(0.15, 1.01): 0.95, (0.10, 0.15): 0.80}
+KEYPOINTS = ("mixed", "heat", "even")
+NEAR_ROTATION_DEG, NEAR_TRANSLATION_PERCENT = 10.0, 5.0
+FLOORS = {(0.15, 1.01): 0.95, (0.10, 0.15): 0.80, (0.05, 0.10): None, (0.0, 0.05): None}
 """Share of first answers that must be right, by overlap."""
 MIN_AUC = 0.97
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What was made of one pair.
+    """What was made of one pair."""
 
-    Attributes:
-        anchors: What the hypotheses hung on: "mixed", "heat" or "even".
-        rotation_deg: Error of the first answer; None where there is no answer.
-        translation_percent: The same, in percent of the object's diameter.
-        score: Of the first answer.
-        evidence: Shares of samples behind that score.
-        rank: Place of the first right answer, from 1; None if none is right.
-    """
-
-    anchors: str
+    anchors: str  # What the hypotheses hung on: "mixed", "heat" or "even"
     object: str
     seed: int
     i: str
@@ -78,13 +71,13 @@ class Answer:
     overlap: float
     gap_deg: float
     kind: str
-    rotation_deg: float | None
-    translation_percent: float | None
-    score: float | None
-    evidence: dict[str, float]
+    rotation_deg: float | None  # Error of the first answer; None where there is no answer
+    translation_percent: float | None  # The same, in percent of the object's diameter
+    score: float | None  # Of the first answer
+    evidence: dict[str, float]  # Shares of samples behind that score
     margin: float
     observability: float
-    rank: int | None
+    rank: int | None  # Place of the first right answer, from 1; None if none is right
     seconds: float
 
     @property
@@ -95,196 +88,213 @@ class Answer:
     @property
     def is_near(self) -> bool:
         """Whether the first answer is at least in the right basin."""
-        return (
-            self.rotation_deg is not None
-            and self.translation_percent is not None
-            and self.rotation_deg <= NEAR_ROTATION_DEG
-            and self.translation_percent <= NEAR_TRANSLATION_PERCENT
-        )
+        if self.rotation_deg is None or self.translation_percent is None:
+            return False
+        is_turned_so = self.rotation_deg <= NEAR_ROTATION_DEG
+        return is_turned_so and self.translation_percent <= NEAR_TRANSLATION_PERCENT
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scans:
+    """Scans of an object, their true poses, and the pairs that are asked for."""
+
+    name: str
+    scans: list[RangeScan]
+    world_from_scan: Mapping[str, Pose]
+    pairs: Mapping[tuple[str, str], tuple[float, float]]  # Overlap, and rotation in degrees
 
 
 def main() -> int:
     """Register all pairs; 0 if the floors are met, else 1."""
     options = _options()
+    if options.quick:
+        objects = [made_scans()]
+    else:
+        objects = [real_scans(name, data_folder(options.data)) for name in options.objects]
     answers: list[Answer] = []
     for anchors in options.keypoints:
-        for name in options.objects:
+        for scans in objects:
             for seed in range(options.seeds):
-                answers += answers_of(name, seed, anchors, options)
+                answers += answers_of(scans, seed, anchors, options.workers)
     if options.out:
         write_results(options.out, [asdict(answer) for answer in answers])
     if options.plot:
-        plot(
-            [answer for answer in answers if answer.anchors == options.keypoints[-1]], options.plot
-        )
-    lines, is_passed = table(answers)
-    print("\n".join(lines))
-    return 0 if is_passed else 1
+        plot([a for a in answers if a.anchors == options.keypoints[-1]], options.plot)
+    print(table(answers), end="")
+    return 0 if options.quick or are_floors_met(answers) else 1
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Scene:
-    """The scans of an object, moved and laid out, with their reference poses."""
-
-    prepared: dict[str, PreparedScan]
-    register: Callable[[tuple[int, int]], PairResult]
-    reference: dict[str, Pose]
-    object_diameter: float
-
-    def errors(self, i: str, j: str, alternative: Alternative) -> tuple[float, float]:
-        """Rotation in degrees, and translation at j's centroid in percent of the diameter."""
-        scan_i, scan_j = self.prepared[i], self.prepared[j]
-        found = scan_i.scan_from_sensor @ alternative.i_from_j @ scan_j.scan_from_sensor.inverse()
-        off = (self.reference[i].inverse() @ self.reference[j]).inverse() @ found
-        shift = off.shift_at(scan_j.scan.points.mean(axis=0))
-        return off.angle_deg(), 100.0 * shift / self.object_diameter
-
-
-def answers_of(
-    name: str, seed: int, anchors: Keypoints, options: argparse.Namespace
-) -> list[Answer]:
-    """Register all pairs of an object, its scans moved as the seed says."""
+def real_scans(name: str, data: Path) -> Scans:
+    """Of an object of the data."""
     folder, names, max_gap_deg = OBJECTS[name]
-    data = data_folder(options.data) / folder
-    config = Config(pairs=PairsConfig(keypoints=anchors))
+    with (data / folder / "overlaps.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    pairs = {
+        (row["i"], row["j"]): (min(float(row["overlap_ij"]), float(row["overlap_ji"])), gap)
+        for row in rows
+        if (gap := float(row["rotation_deg"])) <= max_gap_deg
+    }
+    scans = [read_scan(data / folder / f"{name}.ply") for name in names]
+    poses = read_poses(data / folder / "poses.json").poses
+    return Scans(name=name, scans=scans, world_from_scan=poses, pairs=pairs)
+
+
+def made_scans() -> Scans:
+    """Three of a made object, without the data."""
+    body = make_body("thing", 0)
+    views = ring(body, np.random.default_rng(0), count=3, step_deg=40.0, pixels=(120.0,))
+    shots = take_shots(body, views, SLIGHT, 0)
+    overlaps = shot_overlaps(shots)
+    pairs = {
+        (f"{i}", f"{j}"): (float(overlaps[i, j]), 40.0 * (j - i))
+        for i, j in combinations(range(len(shots)), 2)
+    }
+    poses = {shot.scan.name: shot.pose for shot in shots}
+    return Scans(
+        name="made", scans=[shot.scan for shot in shots], world_from_scan=poses, pairs=pairs
+    )
+
+
+def answers_of(scans: Scans, seed: int, anchors: str, workers: int) -> list[Answer]:
+    """Register all pairs of an object, its scans moved as the seed says."""
+    found: list[Answer] = []
     with single_threaded_algebra():
-        scene = _lay_out(data, names, seed, config, options.workers)
-        rows = [
-            row
-            for row in csv.DictReader((data / "overlaps.csv").open(encoding="utf-8"))
-            if float(row["rotation_deg"]) <= max_gap_deg
-        ]
-        answer = lambda row: _answer(anchors, name, seed, row, scene)  # noqa: E731
-        found: list[Answer] = []
-        for each in map_in_order(answer, rows, options.workers):
+        moved, truth = moved_scans(
+            scans.scans, scans.world_from_scan, seed, any_rotation=True, turn_grids=True
+        )
+        prepared, register = _registrar(moved, anchors, workers)
+        diameter = object_diameter(moved, truth)
+
+        def answer(edge: tuple[str, str]) -> Answer:
+            at = [k for k, scan in enumerate(prepared) if scan.name in edge]
+            i, j = (prepared[k] for k in at)
+            start = time.perf_counter()
+            result = register((at[0], at[1]))
+            seconds = time.perf_counter() - start
+            true = truth[i.name].inverse() @ truth[j.name]
+            errors = [_error(i, j, each.i_from_j, true, diameter) for each in result.alternatives]
+            overlap, gap_deg = scans.pairs[edge]
+            how = {"anchors": anchors, "object": scans.name, "seed": seed, "seconds": seconds}
+            pair = {"i": i.name, "j": j.name, "overlap": overlap, "gap_deg": gap_deg}
+            return Answer(**how, **pair, **_told(result, errors))
+
+        for each in map_in_order(answer, list(scans.pairs), workers):
             found.append(each)
-            told = f"{anchors}, {name} seed {seed}: {len(found)}/{len(rows)}"
+            told = f"{anchors}, {scans.name} seed {seed}: {len(found)}/{len(scans.pairs)}"
             print(f"\r{told}", end="", file=sys.stderr)
-        print(file=sys.stderr)
+    print(file=sys.stderr)
     return found
 
 
-def _lay_out(data: Path, names: tuple[str, ...], seed: int, config: Config, workers: int) -> _Scene:
-    scans = [read_scan(data / f"{name}.ply") for name in names]
-    moved, reference = moved_scans(
-        scans, read_poses(data / "poses.json").poses, seed, any_rotation=True, turn_grids=True
-    )
-    prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), moved, workers))
-    diameter = float(np.median([scan.diameter for scan in prepared]))
-    fields = list(map_in_order(lambda scan: make_field(scan, diameter), prepared, workers))
+def _error(
+    i: PreparedScan, j: PreparedScan, i_from_j: Pose, true: Pose, diameter: float
+) -> tuple[float, float]:
+    """Rotation in degrees, and translation at j's centroid in percent of the diameter."""
+    off = true.inverse() @ i.scan_from_sensor @ i_from_j @ j.scan_from_sensor.inverse()
+    return off.angle_deg(), 100.0 * off.shift_at(j.scan.points.mean(axis=0)) / diameter
+
+
+def _told(result: PairResult, errors: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    """What a pair's result says, and the errors of its answers."""
+    limits = MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT
+    right = [k for k, (r, t) in enumerate(errors, 1) if r <= limits[0] and t <= limits[1]]
+    rotation, translation = errors[0] if errors else (None, None)
+    return {
+        "kind": str(result.kind),
+        "rotation_deg": rotation,
+        "translation_percent": translation,
+        "score": result.best.score if result.best else None,
+        "evidence": asdict(result.best.evidence) if result.best else {},
+        "margin": result.margin,
+        "observability": result.observability,
+        "rank": right[0] if right else None,
+    }
+
+
+def _registrar(
+    scans: Sequence[RangeScan], anchors: str, workers: int
+) -> tuple[list[PreparedScan], Callable[[tuple[int, int]], PairResult]]:
+    """Prepare scans as a run does; the method's own way to register two of them, by index."""
+    config = Config(pairs=PairsConfig.model_validate({"keypoints": anchors}))
+    prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), scans, workers))
+    fields = list(map_in_order(make_field, prepared, workers))
     features = [None] * len(prepared)
-    if config.pairs.keypoints != "even":
+    if anchors != "even":
         features = list(map_in_order(lambda scan: describe(scan, config.heat), prepared, workers))
     contours = contour_matcher(prepared, config.contours)
-    return _Scene(
-        prepared=dict(zip(names, prepared, strict=True)),
-        register=pair_registrar(prepared, features, fields, contours, diameter, config),
-        reference=reference,
-        object_diameter=object_diameter(moved, reference),
+    return prepared, pair_registrar(prepared, features, fields, contours, config).register
+
+
+def table(answers: Sequence[Answer]) -> str:
+    """Markdown by anchors and overlap."""
+    headings = (
+        *("anchors", "overlap", "pairs", "right first", "floor", "near first", "right among kept"),
+        *("accepted", "accepted wrong", "rotation median (deg)", "translation median (%)"),
+        "seconds a pair",
     )
+    rows = []
+    for (anchors, (low, high)), inside in _binned(answers).items():
+        right = [answer for answer in inside if answer.is_right]
+        accepted = [answer for answer in inside if answer.kind == PairKind.GOOD]
+        floor = FLOORS[low, high]
+        rows.append(
+            (
+                *(anchors, f"{low:.2f}-{min(high, 1.0):.2f}", len(inside)),
+                judged(f"{len(right) / len(inside):.1%}", _is_met(inside, floor)),
+                "-" if floor is None else f"{floor:.0%}",
+                f"{np.mean([answer.is_near for answer in inside]):.1%}",
+                f"{np.mean([answer.rank is not None for answer in inside]):.1%}",
+                *(len(accepted), sum(not answer.is_right for answer in accepted)),
+                _median([answer.rotation_deg for answer in right]),
+                _median([answer.translation_percent for answer in right]),
+                f"{np.mean([answer.seconds for answer in inside]):.2f}",
+            )
+        )
+    told = ", ".join(f"{anchors} {value:.4f}" for anchors, value in aucs(answers).items())
+    sentence = f"AUC of the score, right against wrong first answers: {told} (floor {MIN_AUC})."
+    return f"{markdown_table(headings, rows)}\n{sentence}\n"
 
 
-def _answer(
-    anchors: Keypoints, name: str, seed: int, row: Mapping[str, str], scene: _Scene
-) -> Answer:
-    names = list(scene.prepared)
-    first, second = sorted((names.index(row["i"]), names.index(row["j"])))
-    i, j = names[first], names[second]
-    start = time.perf_counter()
-    result = scene.register((first, second))
-    seconds = time.perf_counter() - start
-    errors = [scene.errors(i, j, alternative) for alternative in result.alternatives]
-    right = [
-        k
-        for k, (rotation, translation) in enumerate(errors, start=1)
-        if rotation <= MAX_ROTATION_DEG and translation <= MAX_TRANSLATION_PERCENT
-    ]
-    rotation, translation = errors[0] if errors else (None, None)
-    return Answer(
-        anchors=anchors,
-        object=name,
-        seed=seed,
-        i=i,
-        j=j,
-        overlap=min(float(row["overlap_ij"]), float(row["overlap_ji"])),
-        gap_deg=float(row["rotation_deg"]),
-        kind=str(result.kind),
-        rotation_deg=rotation,
-        translation_percent=translation,
-        score=result.best.score if result.best else None,
-        evidence=asdict(result.best.evidence) if result.best else {},
-        margin=result.margin,
-        observability=result.observability,
-        rank=right[0] if right else None,
-        seconds=seconds,
-    )
+def are_floors_met(answers: Sequence[Answer]) -> bool:
+    """Whether enough is right at every overlap, and told from wrong by its score."""
+    bins = _binned(answers).items()
+    are_right = all(_is_met(inside, FLOORS[overlap]) for (_, overlap), inside in bins)
+    return are_right and all(value >= MIN_AUC for value in aucs(answers).values())
 
 
-def table(answers: list[Answer]) -> tuple[list[str], bool]:
-    """Markdown lines by anchors and overlap, and whether the floors are met."""
-    lines = [
-        "| anchors | overlap | pairs | right first | floor | near first | right among kept "
-        "| accepted | accepted wrong | rotation median (deg) | translation median (%) "
-        "| seconds a pair |",
-        "|" + "---|" * 12,
-    ]
-    kinds = list(dict.fromkeys(answer.anchors for answer in answers))
-    is_passed = True
-    for anchors, (low, high) in product(kinds, BINS):
-        inside = [a for a in answers if a.anchors == anchors and low <= a.overlap < high]
-        if not inside:
-            continue
-        share = float(np.mean([answer.is_right for answer in inside]))
-        floor = FLOORS.get((low, high))
-        is_met = floor is None or share >= floor
-        is_passed &= is_met
-        told = f"| {anchors} | {low:.2f}-{min(high, 1.0):.2f} | "
-        lines.append(told + _cells(inside, share, floor) + " |")
-    values = {kind: auc([a for a in answers if a.anchors == kind]) for kind in kinds}
-    is_passed &= all(value >= MIN_AUC for value in values.values())
-    told = ", ".join(f"{kind} {value:.4f}" for kind, value in values.items())
-    lines.append(
-        f"\nAUC of the score, right against wrong first answers: {told} (floor {MIN_AUC})."
-    )
-    return lines, is_passed
+def aucs(answers: Sequence[Answer]) -> dict[str, float]:
+    """By anchors: chance that a right first answer scores higher than a wrong one."""
+    return {
+        anchors: Stated.of(
+            (a.score, a.is_right) for a in answers if a.anchors == anchors and a.score is not None
+        ).auc
+        for anchors in dict.fromkeys(answer.anchors for answer in answers)
+    }
 
 
-def _cells(inside: list[Answer], share: float, floor: float | None) -> str:
-    right = [answer for answer in inside if answer.is_right]
-    accepted = [answer for answer in inside if answer.kind == PairKind.GOOD]
-    is_missed = floor is not None and share < floor
-    cells = (
-        len(inside),
-        f"**{share:.1%} FAIL**" if is_missed else f"{share:.1%}",
-        "-" if floor is None else f"{floor:.0%}",
-        f"{np.mean([answer.is_near for answer in inside]):.1%}",
-        f"{np.mean([answer.rank is not None for answer in inside]):.1%}",
-        len(accepted),
-        sum(not answer.is_right for answer in accepted),
-        _median([answer.rotation_deg for answer in right]),
-        _median([answer.translation_percent for answer in right]),
-        f"{np.mean([answer.seconds for answer in inside]):.2f}",
-    )
-    return " | ".join(str(cell) for cell in cells)
+def _binned(
+    answers: Sequence[Answer],
+) -> dict[tuple[str, tuple[float, float]], list[Answer]]:
+    """Answers by anchors and overlap, as far as there are some."""
+    kinds = dict.fromkeys(answer.anchors for answer in answers)
+    bins = {
+        (kind, (low, high)): [a for a in answers if a.anchors == kind and low <= a.overlap < high]
+        for kind in kinds
+        for low, high in FLOORS
+    }
+    return {key: inside for key, inside in bins.items() if inside}
 
 
-def _median(values: list[float | None]) -> str:
+def _is_met(inside: Sequence[Answer], floor: float | None) -> bool:
+    return floor is None or float(np.mean([answer.is_right for answer in inside])) >= floor
+
+
+def _median(values: Sequence[float | None]) -> str:
     known = [value for value in values if value is not None]
     return f"{np.median(known):.2f}" if known else "-"
 
 
-def auc(answers: list[Answer]) -> float:
-    """Chance that a right first answer has a higher score than a wrong one; NaN without either."""
-    given = [answer for answer in answers if answer.score is not None]
-    is_right = np.array([answer.is_right for answer in given], dtype=bool)
-    num_right, num_wrong = int(is_right.sum()), int((~is_right).sum())
-    if not num_right or not num_wrong:
-        return float("nan")
-    ranks = rankdata([answer.score for answer in given])
-    return float((ranks[is_right].sum() / num_right - 0.5 * (num_right + 1)) / num_wrong)
-
-
-def plot(answers: list[Answer], path: Path) -> None:
+def plot(answers: Sequence[Answer], path: Path) -> None:
     """Score against overlap, right and wrong, and the share of right answers by overlap."""
     import matplotlib
 
@@ -317,15 +327,15 @@ def plot(answers: list[Answer], path: Path) -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Register pairs of real scans from any start.")
-    parser.add_argument("--objects", nargs="+", choices=list(OBJECTS), default=list(OBJECTS))
-    parser.add_argument("--seeds", type=int, default=1, help="number of random frames of each scan")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument(
-        "--keypoints", nargs="+", choices=["mixed", "heat", "even"], default=["mixed"]
-    )
-    parser.add_argument("--data", type=Path, help="folder of the Stanford data")
-    parser.add_argument("--out", type=Path, help="JSON file of all answers")
-    parser.add_argument("--plot", type=Path, help="PNG file, of the last kind of keypoints")
+    add = parser.add_argument
+    add("--objects", nargs="+", choices=list(OBJECTS), default=list(OBJECTS))
+    add("--quick", action="store_true", help="a few pairs of a made object")
+    add("--seeds", type=int, default=1, help="number of random frames of each scan")
+    add("--workers", type=int, default=2)
+    add("--keypoints", nargs="+", choices=KEYPOINTS, default=["mixed"])
+    add("--data", type=Path, help="folder of the Stanford data")
+    add("--out", type=Path, help="JSON file of all answers")
+    add("--plot", type=Path, help="PNG file, of the last kind of keypoints")
     return parser.parse_args()
 
 

@@ -1,6 +1,7 @@
 """Run the main job on sets of scans, as users do, and hold its poses against the reference.
 
-    python benchmarks/run.py --sets bunny10 dragon15 --seeds 3 --workers 2 --out results.json
+    python -m benchmarks.run --sets bunny10 dragon15 --seeds 3 --workers 2 --out results.json
+    python -m benchmarks.run --quick
 
 Every seed gives the files another order, neutral names and random frames. The table shows, over the
 seeds: the fewest right, the most wrong, medians of the mean errors, the largest of the maximum
@@ -12,19 +13,23 @@ import argparse
 import json
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any
 
-from results import write_results
+from benchmarks.blocks import judged, markdown_table
+from benchmarks.kept import warn_of_old_calibration
+from benchmarks.results import Json, write_results
+from benchmarks.sets import QUICK, SETS, BenchmarkSet, data_folder, make_set
 from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
 from scanweld.io import PoseSet, read_poses
-from sets import SETS, BenchmarkSet, Floors, Truth, data_folder, make_set
 
+ALL = {**SETS, **QUICK}
 COLUMNS = (
     ("rotation_mean", "rotation mean (deg)", median, 3),
     ("rotation_max", "rotation max (deg)", max, 3),
@@ -40,34 +45,35 @@ COLUMNS = (
 def main() -> int:
     """Run the sets; 0 if all floors are met, else 1."""
     options = _options()
-    runs: list[dict[str, Any]] = []
-    for name in options.sets:
-        for seed in range(options.seeds):
-            run = run_set(name, seed, options)
-            runs.append(run)
-            print(_progress_line(run), file=sys.stderr, flush=True)
+    warn_of_old_calibration()
+    names, seeds = (list(QUICK), 1) if options.quick else (options.sets, options.seeds)
+    runs: list[Json] = []
+    for name in names:
+        for seed in range(seeds):
+            runs.append(run_set(name, seed, options))
+            _show_progress(runs[-1])
             if options.out:
                 write_results(options.out, runs)
-    rows, is_passed = table(runs)
-    print("\n".join(rows))
-    return 0 if is_passed else 1
+    print(table(runs), end="")
+    return 0 if all(ALL[run["set"]].is_met(run) for run in runs) else 1
 
 
-def run_set(name: str, seed: int, options: argparse.Namespace) -> dict[str, Any]:
+def run_set(name: str, seed: int, options: argparse.Namespace) -> Json:
     """Make a set, run the command on it in a process of its own, and evaluate its poses."""
-    wanted: BenchmarkSet = SETS[name]
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         folder, out = Path(temporary) / "scans", Path(temporary) / "model"
-        truth = make_set(wanted, seed, folder, data_folder(options.data))
+        truth = make_set(ALL[name], seed, folder, data_folder(options.data))
         command = [_executable(), "run", str(folder), "-o", str(out), *options.extra]
-        command += ["--workers", str(options.workers), "-q"]
         environment = dict(os.environ)
         if options.cold:
             environment["NUMBA_CACHE_DIR"] = str(Path(temporary) / "compiled")
-        usage = timed(command, environment)
-        found, report = _outcome(out)
-        if options.keep:
-            _keep(out, options.keep / f"{name}-{seed}")
+        usage = timed([*command, "--workers", str(options.workers), "-q"], environment)
+        found, report = PoseSet(poses={}, components=()), {}
+        if (out / "poses.json").exists():
+            found = read_poses(out / "poses.json")
+            report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+        if options.keep and out.exists():
+            shutil.copytree(out, options.keep / f"{name}-{seed}", dirs_exist_ok=True)
     errors = evaluate_poses(found, truth.poses, centroids=truth.centroids, diameter=truth.diameter)
     return {
         "set": name,
@@ -76,7 +82,15 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> dict[str, Any]
         **usage,
         "stages": report.get("stages", {}),
         **summary(errors),
-        "scans": _by_original(errors, truth),
+        "scans": {
+            truth.originals[name]: {
+                "standing": str(error.standing),
+                "rotation_deg": error.rotation_deg,
+                "translation_percent": 100.0 * error.translation / truth.diameter,
+            }
+            for name, error in sorted(errors.scans.items())
+            if error.standing is not Standing.UNPLACED
+        },
     }
 
 
@@ -98,53 +112,39 @@ def timed(command: list[str], environment: dict[str, str]) -> dict[str, float]:
     }
 
 
-def summary(errors: PoseErrors) -> dict[str, Any]:
+def summary(errors: PoseErrors) -> Json:
     """Counts, and mean and largest errors of the placed scans (None if there are none)."""
-    rotations, translations = errors.rotations_deg, errors.translations_percent
-    is_empty = not len(rotations)
-    return {
-        **{str(standing): errors.count(standing) for standing in Standing},
-        "rotation_mean": None if is_empty else float(rotations.mean()),
-        "rotation_max": None if is_empty else float(rotations.max()),
-        "translation_mean": None if is_empty else float(translations.mean()),
-        "translation_max": None if is_empty else float(translations.max()),
-    }
+    counts: Json = {str(standing): errors.count(standing) for standing in Standing}
+    measured = {"rotation": errors.rotations_deg, "translation": errors.translations_percent}
+    for name, values in measured.items():
+        counts[f"{name}_mean"] = float(values.mean()) if len(values) else None
+        counts[f"{name}_max"] = float(values.max()) if len(values) else None
+    return counts
 
 
-def table(runs: list[dict[str, Any]]) -> tuple[list[str], bool]:
-    """Markdown lines, one a set, and whether every floor is met."""
-    headings = ["set", "seeds", "right", "wrong", *(c[1] for c in COLUMNS), "verdicts"]
-    lines = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
-    is_passed = True
-    for name in dict.fromkeys(run["set"] for run in runs):
-        of_set = [run for run in runs if run["set"] == name]
-        cells, is_met = _row(of_set, SETS[name].floors)
-        lines.append("| " + " | ".join([name, str(len(of_set)), *cells]) + " |")
-        is_passed &= is_met
-    return lines, is_passed
+def table(runs: Sequence[Json]) -> str:
+    """Markdown, one line a set."""
+    headings = ("set", "seeds", "right", "wrong", *(c[1] for c in COLUMNS), "verdicts")
+    by_set = {name: [r for r in runs if r["set"] == name] for name in {r["set"]: 0 for r in runs}}
+    rows = [(name, len(of), *_cells(of, ALL[name])) for name, of in by_set.items()]
+    return markdown_table(headings, rows)
 
 
-def _row(runs: list[dict[str, Any]], floors: Floors) -> tuple[list[str], bool]:
+def _cells(runs: Sequence[Json], wanted: BenchmarkSet) -> list[str]:
     right, wrong = min(run["right"] for run in runs), max(run["wrong"] for run in runs)
-    judged = [
-        _judged(f"{right}/{floors.right}", right >= floors.right),
-        _judged(str(wrong), wrong == 0),
+    cells = [
+        judged(f"{right}/{wanted.num_scans}", right >= wanted.num_scans),
+        judged(str(wrong), wrong == 0),
     ]
     for key, _, together, digits in COLUMNS:
         values = [run[key] for run in runs if run[key] is not None]
-        floor = getattr(floors, key, None)
-        if not values:
-            judged.append(_judged("-", floor is None))
-            continue
-        value = together(values)
-        text = f"{value:.{digits}f}" + (f" ({floor:g})" if floor is not None else "")
-        judged.append(_judged(text, floor is None or value <= floor))
-    verdicts = " ".join(sorted({run["verdict"] for run in runs}))
-    return [text for text, _ in judged] + [verdicts], all(is_met for _, is_met in judged)
-
-
-def _judged(text: str, is_met: bool) -> tuple[str, bool]:
-    return (text if is_met else f"**{text} FAIL**"), is_met
+        floor = wanted.floors.get(key)
+        text = f"{together(values):.{digits}f}" if values else "-"
+        if floor is None or not values:
+            cells.append(judged(text, floor is None))
+        else:
+            cells.append(judged(f"{text} ({floor:g})", together(values) <= floor))
+    return [*cells, " ".join(sorted({run["verdict"] for run in runs}))]
 
 
 def _executable() -> str:
@@ -153,43 +153,17 @@ def _executable() -> str:
     return str(beside) if beside.exists() else "scanweld"
 
 
-def _outcome(out: Path) -> tuple[PoseSet, dict[str, Any]]:
-    """Poses and report of a run; empty where it failed."""
-    if not (out / "poses.json").exists():
-        return PoseSet(poses={}, components=()), {}
-    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
-    return read_poses(out / "poses.json"), report
-
-
-def _by_original(errors: PoseErrors, truth: Truth) -> dict[str, dict[str, Any]]:
-    """Errors under the names that the scans have in the data."""
-    return {
-        truth.originals[name]: {
-            "standing": str(error.standing),
-            "rotation_deg": None if error.standing is Standing.UNPLACED else error.rotation_deg,
-            "translation_percent": None
-            if error.standing is Standing.UNPLACED
-            else 100.0 * error.translation / truth.diameter,
-        }
-        for name, error in sorted(errors.scans.items())
-    }
-
-
-def _keep(out: Path, kept: Path) -> None:
-    if out.exists():
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        subprocess.run(["cp", "-r", str(out), str(kept)], check=True)
-
-
-def _progress_line(run: dict[str, Any]) -> str:
+def _show_progress(run: Json) -> None:
     counts = ", ".join(f"{run[str(standing)]} {standing}" for standing in Standing)
-    return f"{run['set']} seed {run['seed']}: {counts}, {run['verdict']}, {run['seconds']:.1f} s"
+    told = f"{run['set']} seed {run['seed']}: {counts}, {run['verdict']}, {run['seconds']:.1f} s"
+    print(told, file=sys.stderr, flush=True)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Run the main job on sets of scans.")
-    parser.add_argument("--sets", nargs="+", choices=list(SETS), default=list(SETS), metavar="SET")
+    parser.add_argument("--sets", nargs="+", choices=list(ALL), default=list(SETS), metavar="SET")
     parser.add_argument("--seeds", type=int, default=3, help="number of orders, names and frames")
+    parser.add_argument("--quick", action="store_true", help="one small set that needs no data")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--data", type=Path, help="folder of the Stanford data")
     parser.add_argument("--out", type=Path, help="JSON file of all runs")

@@ -11,77 +11,85 @@ on where it stopped. Change the code that measures and they are made again. 0 if
 """
 
 import argparse
-import os
-import shlex
 import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-from benchmarks.judging.page import PAGE, Results, block, write_page
-from benchmarks.judging.rivals import CODE as RIVALS_CODE
-from benchmarks.judging.rivals import Rivals
-from benchmarks.judging.table import CODE as TRUST_CODE
-from benchmarks.judging.table import Runs
-from benchmarks.paper.study import Study, Table
-from benchmarks.virtual.scenarios import SCENARIOS
-from scanweld.work.threads import num_workers
-
-DOCS = Path(__file__).parents[1] / "docs"
-COLUMNS = (
-    TextColumn("{task.description}"),
-    *(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()),
+from benchmarks.judging.other_tools import OtherTools
+from benchmarks.judging.runs import Runs
+from benchmarks.kept import (
+    COMPARED,
+    TRUSTED,
+    Study,
+    Unit,
+    code_digest,
+    measured,
+    warn_of_old_calibration,
 )
+from benchmarks.results import DOCS, command_line, read_results
+from benchmarks.seeds import FIRST_FRESH, spent_among
+from benchmarks.trust_page import PAGE, Results, block, write_page
+from benchmarks.virtual.scenarios import SCENARIOS
+from scanweld.errors import InputError
+from scanweld.work.threads import num_workers
 
 
 def main() -> int:
     """Make runs, comparison and page; 0 if all floors are met or only the page was asked for."""
     options = _options()
+    warn_of_old_calibration()
+    if not options.pages:
+        _measure(options)
+    for name in (PAGE, "data/sets.json"):
+        # Another folder than the documentation's gets a copy of its page and of the real sets.
+        if not (options.out / name).exists():
+            shutil.copyfile(DOCS / name, options.out / name)
+    write_page(options.out)
+    if options.pages:
+        return 0
+    results = Results(options.out)
+    for name in ("trust-seeds", "trust-floors", "trust-scenarios", "trust-rivals", "trust-misses"):
+        print(block(name, results))
+    return int(any(floor.is_met is False for floor in results.floors))
+
+
+def _measure(options: argparse.Namespace) -> None:
     study = Study(
         out=options.out,
         work=options.work or options.out.parent / ".trust.work",
         workers=num_workers(options.jobs),
         quick=options.quick,
-        command=shlex.join(["python", "-m", "benchmarks.trust", *sys.argv[1:]]),
-        code=TRUST_CODE,
+        command=command_line("benchmarks.trust"),
+        code=TRUSTED,
     )
-    if options.so_far:
-        runs = Runs(scenarios=tuple(options.only), seeds=options.seeds)
-        study.write(runs, study.finished(runs))
-    elif not options.pages:
-        _measure(Runs(scenarios=tuple(options.only), seeds=options.seeds), study)
-        if options.compare:
-            _measure(Rivals(), replace(study, code=RIVALS_CODE))
-    _write_page(options.out)
-    results = Results(options.out)
-    if options.pages:
-        return 0
-    for name in ("trust-floors", "trust-scenarios", "trust-rivals", "trust-misses"):
-        print(block(name, results))
-    return int(any(floor.is_met is False for floor in results.floors))
+    runs = Runs(scenarios=options.only, seeds=options.seeds, first_seed=options.first_seed)
+    refuse_seen_seeds(runs.units(options.quick), options.out)
+    study.write(runs, measured(runs, study))
+    if options.compare:
+        others, study = OtherTools(first_seed=options.first_seed), replace(study, code=COMPARED)
+        study.write(others, measured(others, study))
 
 
-def _measure(table: Table, study: Study) -> None:
-    with Progress(*COLUMNS, console=Console(stderr=True)) as progress:
-        task = progress.add_task(table.NAME, total=None)
-        records = study.records(
-            table, lambda done, total: progress.update(task, completed=done, total=total)
+def refuse_seen_seeds(units: list[Unit], out: Path) -> None:
+    """Measure no seeds anew that a page shows for other code, unless the ledger says so.
+
+    Raises:
+        InputError: If the folder's page was measured with some of them, and they are not spent.
+    """
+    published = out / "data/trust.json"
+    if not published.exists():
+        return
+    document, asked = read_results(published), {unit["seed"] for unit in units}
+    if document["code"] == code_digest(TRUSTED):
+        return
+    seen = asked & {record["seed"] for record in document["records"]}
+    fresh = sorted(seed for seed in seen if not spent_among([seed]))
+    if fresh:
+        raise InputError(
+            f"seeds {fresh[0]} to {fresh[-1]} were already looked at in {PAGE}: enter them into "
+            "LEDGER of benchmarks/seeds.py and measure fresh ones, see benchmarks/SEEDS.md"
         )
-        study.write(table, records)
-
-
-def _write_page(out: Path) -> None:
-    """In another folder than the documentation's, from a copy of its page and of the real sets."""
-    for name in (PAGE, "data/sets.json"):
-        if not (out / name).exists():
-            shutil.copyfile(DOCS / name, out / name)
-    write_page(out)
 
 
 def _options() -> argparse.Namespace:
@@ -90,19 +98,16 @@ def _options() -> argparse.Namespace:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--only", nargs="+", choices=SCENARIOS, default=SCENARIOS, metavar="NAME")
-    parser.add_argument("--seeds", type=int, help="of each scenario, at most (default: its own)")
-    parser.add_argument("--quick", action="store_true", help="a handful of runs")
-    parser.add_argument(
-        "--compare", action="store_true", help="other tools on some pairs too (extra: bench)"
-    )
-    parser.add_argument(
-        "--so-far", action="store_true", help="no more runs: the page from those that are finished"
-    )
-    parser.add_argument("--pages", action="store_true", help="only write the page anew")
-    parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
-    parser.add_argument("--out", type=Path, default=DOCS, help="folder of the page (docs)")
-    parser.add_argument("--work", type=Path, help="finished runs (default: .trust.work beside out)")
+    add = parser.add_argument
+    add("--only", nargs="+", choices=SCENARIOS, default=tuple(SCENARIOS), metavar="NAME")
+    add("--seeds", type=int, default=10**6, help="of each scenario, at most (default: its own)")
+    add("--first-seed", type=int, default=FIRST_FRESH, help="see benchmarks/SEEDS.md")
+    add("--quick", action="store_true", help="a handful of runs")
+    add("--compare", action="store_true", help="other tools on some pairs too (extra: bench)")
+    add("--pages", action="store_true", help="only write the page anew")
+    add("--jobs", type=int, help="processes (default: one a core)")
+    add("--out", type=Path, default=DOCS, help="folder of the page (docs)")
+    add("--work", type=Path, help="finished runs (default: .trust.work beside out)")
     return parser.parse_args()
 
 

@@ -6,6 +6,9 @@ import pytest
 
 from scanweld.app.cli import main
 
+COARSE = "[fusion]\nmax_voxels_across = 60\n"
+"""Settings for runs whose model is not looked at."""
+
 
 def scanweld(*arguments: str | Path) -> int:
     """Run a command.

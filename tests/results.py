@@ -1,6 +1,7 @@
 """Outcomes of runs that never took place, for tests of what is done with them."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -117,3 +118,18 @@ def stub_run(
         progress(StageAdvanced(stage="prepare", done=done + 1, total=len(scans)))
         (cache or NoCache()).put(scan.content_hash(), scan.name)
     return a_result([scan.name for scan in scans], unreadable, config)
+
+
+class Memory:
+    """A cache that counts what it is asked to keep."""
+
+    def __init__(self) -> None:
+        self.kept: dict[str, Any] = {}
+        self.num_put = 0
+
+    def get(self, key: str) -> Any:
+        return self.kept.get(key)
+
+    def put(self, key: str, value: Any) -> None:
+        self.num_put += 1
+        self.kept[key] = value

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.scan import RangeScan
+from scanweld.io import write_scan_ply
 
 MILD_NOISE = NoiseModel(
     depth_diameters=5e-4, dropout=0.01, grazing_dropout=0.5, quantum_diameters=2e-4
@@ -78,6 +80,14 @@ def scene_of(
         scans.append(scan)
         poses[scan.name] = view.world_from_sensor @ motion.inverse()
     return Scene(mesh=mesh, views=tuple(views), scans=tuple(scans), world_from_scan=poses)
+
+
+def write_scans(folder: Path, scans: Sequence[RangeScan]) -> Path:
+    """The folder, with a file for each scan."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for scan in scans:
+        write_scan_ply(folder / f"{scan.name}.ply", scan)
+    return folder
 
 
 def creature_scene(

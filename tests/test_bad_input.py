@@ -4,37 +4,33 @@ import json
 import math
 import shutil
 import struct
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from scanweld.app.cli import main
 from scanweld.evaluation.metrics import Standing, evaluate_poses
-from scanweld.geometry.pose import Pose
-from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_poses, write_scan_ply
-from tests.scenes import Scene, creature_scene
+from tests.command_line import COARSE, scanweld
+from tests.prepared import scaled
+from tests.scenes import Scene, creature_scene, write_scans
 
 pytestmark = pytest.mark.slow
 
-GOOD = ["scan_01", "scan_02", "scan_03", "scan_04", "scan_05", "scan_06"]
+GOOD = ["scan_01", "scan_02", "scan_03", "scan_04"]
 IN_MILLIMETRES = 1000.0
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return creature_scene(6, pixels=140)
+    whole = creature_scene(8, pixels=140)
+    return replace(whole, scans=whole.scans[:4])
 
 
 @pytest.fixture(scope="module")
-def folder(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    folder = tmp_path_factory.mktemp("bad") / "scans"
-    folder.mkdir()
-    for scan in scene.scans:
-        write_scan_ply(folder / f"{scan.name}.ply", scan)
+def folder(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_scans(tmp_path_factory.mktemp("bad") / "scans", scene.scans)
     whole = (folder / "scan_01.ply").read_bytes()
     shutil.copy(folder / "scan_02.ply", folder / "scan_02_copy.ply")
     (folder / "truncated.ply").write_bytes(whole[: len(whole) // 2])
@@ -44,15 +40,9 @@ def folder(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
     write_scan_ply(folder / "millimetres.ply", scaled(scene.scans[2], IN_MILLIMETRES))
     other = creature_scene(3, pixels=140, object_seed=5).scans[1]
     write_scan_ply(folder / "stranger.ply", replace(other, name="stranger"))
-    spoil_first_point(folder / "scan_05.ply")
-    yield folder
-
-
-def scaled(scan: RangeScan, scale: float) -> RangeScan:
-    assert scan.scan_from_sensor is not None
-    pose = scan.scan_from_sensor
-    moved = Pose(rotation=pose.rotation, translation=scale * pose.translation)
-    return replace(scan, points=scale * scan.points, scan_from_sensor=moved)
+    spoil_first_point(folder / "scan_04.ply")
+    (folder.parent / "coarse.toml").write_text(COARSE)
+    return folder
 
 
 def spoil_first_point(path: Path) -> None:
@@ -67,10 +57,8 @@ def spoil_first_point(path: Path) -> None:
 @pytest.fixture(scope="module")
 def outcome(folder: Path) -> tuple[int, Path]:
     model = folder.parent / "model"
-    with pytest.raises(SystemExit) as left:
-        main(["run", str(folder), "-o", str(model), "-q"])
-    assert isinstance(left.value.code, int)
-    return left.value.code, model
+    coarse = folder.parent / "coarse.toml"
+    return scanweld("run", folder, "-o", model, "-q", "--workers", "1", "--config", coarse), model
 
 
 def load(path: Path) -> Any:
@@ -82,13 +70,15 @@ def test_the_rest_goes_on_and_the_exit_code_tells(outcome: tuple[int, Path]):
     assert code == 3
     assert (model / "model.ply").exists()
     assert load(model / "report.json")["verdict"] == "partial"
+    assert len(load(model / "poses.json")["unplaced"]) == 7
 
 
 def test_the_good_scans_are_placed_rightly(outcome: tuple[int, Path], scene: Scene):
     estimate = read_poses(outcome[1] / "poses.json")
     assert sorted(estimate.poses) == GOOD
     centroids = {scan.name: scan.points.mean(axis=0) for scan in scene.scans}
-    errors = evaluate_poses(estimate, scene.world_from_scan, centroids=centroids, diameter=170.0)
+    truth = {name: scene.world_from_scan[name] for name in GOOD}
+    errors = evaluate_poses(estimate, truth, centroids=centroids, diameter=170.0)
     assert errors.count(Standing.RIGHT) == len(GOOD)
 
 
@@ -113,14 +103,10 @@ def test_what_cannot_be_used_is_named_with_the_reason(
     assert (report["verdict"], report["reason"]) == ("unplaced", unplaced[name])
 
 
-def test_nothing_else_is_unplaced(outcome: tuple[int, Path]):
-    assert len(load(outcome[1] / "poses.json")["unplaced"]) == 7
-
-
 def test_points_that_are_not_finite_are_dropped_and_counted(outcome: tuple[int, Path]):
     scans = load(outcome[1] / "report.json")["scans"]
-    assert scans["scan_05"]["num_dropped"] == 1
-    assert scans["scan_04"]["num_dropped"] == 0
+    assert scans["scan_04"]["num_dropped"] == 1
+    assert scans["scan_03"]["num_dropped"] == 0
 
 
 def test_every_pair_is_reported_once_in_the_order_of_names(outcome: tuple[int, Path]):

@@ -25,11 +25,22 @@ from tests.command_line import error_line, scanweld
 from tests.results import a_result, stub_run, turned
 from tests.scenes import PRIMITIVES
 
+PAGE = "report.html"
+
 
 @pytest.fixture(autouse=True)
-def stubbed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(job.pipeline, "run", stub_run)
+def seen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Any]:
+    """Neither the pipeline nor the page take their time; what the pipeline was asked for."""
+    settings: dict[str, Any] = {}
+
+    def run(*arguments: Any, **given: Any) -> object:
+        settings.update(given)
+        return stub_run(*arguments, **given)
+
+    monkeypatch.setattr(job.pipeline, "run", run)
+    monkeypatch.setattr(job, "write_html_report", lambda folder, *_: (folder / PAGE).touch())
     monkeypatch.chdir(tmp_path)
+    return settings
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +61,11 @@ def scans(scan_file: Path, tmp_path: Path) -> Path:
     return folder
 
 
+def report() -> Any:
+    """The report of the output that tests write most."""
+    return json.loads(Path("model/report.json").read_text())
+
+
 def fail_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
     def run(*arguments: Any, **settings: Any) -> None:
         stub_run(*arguments, **settings)
@@ -63,14 +79,8 @@ def test_run_writes_the_output_and_a_summary(scans: Path, capsys: pytest.Capture
     out, err = capsys.readouterr()
     assert out.startswith("good: all 3 scans are placed") and "model.ply" in out
     assert "error" not in err
-    assert sorted(path.name for path in Path("model").iterdir()) == [
-        "config.toml",
-        "graph.json",
-        "model.ply",
-        "poses.json",
-        "report.html",
-        "report.json",
-    ]
+    names = {"config.toml", "graph.json", "model.ply", "poses.json", "report.html", "report.json"}
+    assert {path.name for path in Path("model").iterdir()} == names
     assert not work_folder(Path("model")).exists()
 
 
@@ -81,30 +91,16 @@ def test_files_patterns_and_folders_are_the_same(scans: Path):
         assert Path(f"m{k}/poses.json").read_bytes() == Path("m0/poses.json").read_bytes()
 
 
-def test_options_reach_the_settings(scans: Path, monkeypatch: pytest.MonkeyPatch):
-    seen: dict[str, Any] = {}
-
-    def run(*arguments: Any, **settings: Any) -> object:
-        seen.update(settings)
-        return stub_run(*arguments, **settings)
-
-    monkeypatch.setattr(job.pipeline, "run", run)
-    Path("my.toml").write_text("seed = 3\n[pairs]\nnum_turns = 36\n")
+def test_options_reach_the_settings(scans: Path, seen: dict[str, Any]):
+    Path("my.toml").write_text("seed = 3\n[pairs]\nnum_turns = 36\n[fusion]\nsmooth = 7\n")
     options = ["--config", "my.toml", "--seed", "5", "--unit", "mm", "--workers", "2"]
+    options += ["--holes", "carve", "--component", "largest", "--watertight", "--faces", "500"]
     assert scanweld("run", scans, "-o", "model", *options) == 0
-    settings = json.loads(Path("model/report.json").read_text())["settings"]
+    settings = report()["settings"]
     assert (settings["seed"], settings["unit"], settings["pairs"]["num_turns"]) == (5, "mm", 36)
+    fusion = {"holes": "carve", "component": "largest", "watertight": True, "faces": 500}
+    assert {**fusion, "smooth": 7}.items() <= settings["fusion"].items()
     assert seen["workers"] == 2
-
-
-def test_options_of_the_model_are_settings_of_the_fusion(scans: Path):
-    Path("my.toml").write_text("[fusion]\nsmooth = 7\nmax_voxels_across = 60\n")
-    options = ["--holes", "carve", "--component", "largest", "--watertight", "--faces", "500"]
-    assert scanweld("run", scans, "-o", "model", "--config", "my.toml", *options) == 0
-    fusion = json.loads(Path("model/report.json").read_text())["settings"]["fusion"]
-    told = [fusion[key] for key in ("holes", "component", "watertight", "faces")]
-    assert told == ["carve", "largest", True, 500]
-    assert (fusion["smooth"], fusion["max_voxels_across"]) == (7, 60)
 
 
 @pytest.mark.parametrize(
@@ -136,33 +132,23 @@ def test_usage_errors_exit_with_2(
     assert scanweld(*arguments) == 2
     out, err = capsys.readouterr()
     assert out == "" and "Error" in err and "Traceback" not in err
+    if "--method" in arguments:
+        assert "robust" in err and "paper" in err  # the two there are
     assert [path.name for path in Path().iterdir()] == ["scans"]
-
-
-def test_an_unknown_method_is_told_the_two_there_are(capsys: pytest.CaptureFixture[str]):
-    assert scanweld("run", "scans", "-o", "model", "--method", "nonsense") == 2
-    told = [line for line in capsys.readouterr().err.splitlines() if "nonsense" in line]
-    assert len(told) == 1 and "robust" in told[0] and "paper" in told[0]
 
 
 def test_the_method_may_come_from_the_settings_or_the_command(scans: Path):
     Path("my.toml").write_text("method = 'paper'\n")
-    for output, options in (("a", ["--config", "my.toml"]), ("b", ["--method", "paper"])):
-        assert scanweld("run", scans, "-o", output, *options) == 0
-        told = json.loads(Path(output, "report.json").read_text())
-        assert told["settings"]["method"] == "paper"
-    assert scanweld("run", scans, "-o", "c", "--config", "my.toml", "--method", "robust") == 0
-    assert json.loads(Path("c/report.json").read_text())["settings"]["method"] == "robust"
+    for method, options in (
+        ("paper", ["--config", "my.toml"]),
+        ("paper", ["--method", "paper"]),
+        ("robust", ["--config", "my.toml", "--method", "robust"]),
+    ):
+        assert scanweld("run", scans, "-o", "model", "--force", *options) == 0
+        assert report()["settings"]["method"] == method
 
 
-def test_facts_reach_the_run(scans: Path, monkeypatch: pytest.MonkeyPatch):
-    seen: dict[str, Any] = {}
-
-    def run(*arguments: Any, **settings: Any) -> object:
-        seen.update(settings)
-        return stub_run(*arguments, **settings)
-
-    monkeypatch.setattr(job.pipeline, "run", run)
+def test_facts_reach_the_run(scans: Path, seen: dict[str, Any]):
     Path("facts.json").write_text('{"apart": [["c", "b"]], "fix": ["c"]}')
     write_poses("p.json", PoseSet(poses={"a": turned(1)}, components=(("a",),)))
     together = ["--together", "b", "a", "--together", "c", "a"]
@@ -195,12 +181,6 @@ def test_facts_that_cannot_be_meant_exit_with_2(
     assert not Path("model").exists() and not work_folder(Path("model")).exists()
 
 
-def test_the_package_runs_as_a_module():
-    asked = [sys.executable, "-m", "scanweld", "--version"]
-    told = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
-    assert re.search(r"\d+\.\d+", told)
-
-
 def test_version_and_help(capsys: pytest.CaptureFixture[str]):
     assert scanweld("--version") == 0
     assert capsys.readouterr().out.startswith("scanweld 0.")
@@ -224,7 +204,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]):
         (["scans", "-o", "scans", "--force"], r"scans: holds the input a.ply"),
         (["scans", "-o", "notes.md"], r"notes.md: is not a folder"),
         (["scans", "-o", "full"], r"full: is not empty.*--force"),
-        (["scans", "-o", "/proc/nowhere"], r"/proc/nowhere: cannot be written"),
+        (["scans", "-o", f"{'m' * 300}"], r"m: cannot be written"),
     ],
 )
 def test_bad_input_exits_with_1_one_line_and_nothing_written(
@@ -257,8 +237,7 @@ def test_unreadable_files_are_named_while_the_rest_goes_on(
     assert list(poses["unplaced"]) == ["empty", "text", "truncated"]
     for name, reason in poses["unplaced"].items():
         assert f"unplaced {name}: {reason}" in out
-    report = json.loads(Path("model/report.json").read_text())
-    assert (report["verdict"], report["exit_code"]) == ("partial", 3)
+    assert (report()["verdict"], report()["exit_code"]) == ("partial", 3)
 
 
 def test_same_stem_twice_gives_relative_paths(scans: Path):
@@ -269,6 +248,7 @@ def test_same_stem_twice_gives_relative_paths(scans: Path):
     assert list(json.loads(Path("model/poses.json").read_text())["scans"]) == ["left/s", "right/s"]
 
 
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names of files are text there")
 def test_file_names_that_are_no_utf8_are_spelled_out(scans: Path):
     shutil.move(scans / "a.ply", os.fsdecode(os.fsencode(scans) + b"/\xff.ply"))
     Path(os.fsdecode(os.fsencode(scans) + b"/\xfe.ply")).write_text("broken")
@@ -317,23 +297,14 @@ def test_crash_is_no_success(scans: Path, monkeypatch: pytest.MonkeyPatch):
     assert not Path("model").exists()
 
 
-def test_quiet_run_says_nothing_on_stderr(scans: Path, capsys: pytest.CaptureFixture[str]):
-    assert scanweld("run", scans, "-o", "model", "-q") == 0
-    out, err = capsys.readouterr()
-    assert out and err == ""
-
-
-def test_info_shows_what_was_read(scans: Path, capsys: pytest.CaptureFixture[str]):
+def test_info_shows_what_was_read_and_names_the_broken_file(
+    scans: Path, capsys: pytest.CaptureFixture[str]
+):
     assert scanweld("info", scans / "a.ply", scans / "b.ply") == 0
     out = capsys.readouterr().out
     for word in ("a\n", "b\n", "points", "grid", "camera     pinhole", "viewpoint  given"):
         assert word in out
     assert "resolution" in out and "diameter" in out
-
-
-def test_info_names_the_broken_file_and_shows_the_others(
-    scans: Path, capsys: pytest.CaptureFixture[str]
-):
     (scans / "broken.ply").write_text("not a scan")
     assert scanweld("info", scans) == 1
     out, err = capsys.readouterr()
@@ -346,11 +317,8 @@ def test_simulate_then_evaluate(capsys: pytest.CaptureFixture[str]):
     write_mesh_ply("box.ply", PRIMITIVES["box"]())
     options = ["--num-scans", "3", "--pixels", "40", "--noise", "0", "--camera", "orthographic"]
     assert scanweld("simulate", "box.ply", "-o", "sim", *options) == 0
-    assert sorted(path.name for path in Path("sim").glob("*.ply")) == [
-        "scan_01.ply",
-        "scan_02.ply",
-        "scan_03.ply",
-    ]
+    names = {"scan_01.ply", "scan_02.ply", "scan_03.ply"}
+    assert {path.name for path in Path("sim").glob("*.ply")} == names
     truth = Path("sim/truth/poses.json")
     capsys.readouterr()
     assert scanweld("evaluate", truth, truth, "--scans", "sim") == 0
@@ -383,9 +351,10 @@ def test_evaluate_needs_every_placed_scan(scans: Path, capsys: pytest.CaptureFix
     assert "elsewhere" in error_line(capsys)
 
 
-def test_installed_command_leaves_with_its_exit_code():
-    command = [sys.executable, "-c", "from scanweld.app.cli import main; main()", "run", "nowhere"]
-    done = subprocess.run([*command, "-o", "model"], capture_output=True, text=True, check=False)
+@pytest.mark.slow
+def test_the_package_runs_as_a_module_and_leaves_with_its_exit_code():
+    command = [sys.executable, "-m", "scanweld", "run", "nowhere", "-o", "model"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stdout == ""
     assert done.stderr == "scanweld: error: nowhere: there is no such file; check the path\n"

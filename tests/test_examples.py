@@ -14,8 +14,6 @@ from scanweld.geometry.pose import Pose
 from scanweld.io import read_poses
 from tests.results import a_result
 
-pytestmark = pytest.mark.slow
-
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -30,6 +28,7 @@ def number(pattern: str, text: str) -> float:
     return float(found[1])
 
 
+@pytest.mark.slow
 def test_run_rendered(capsys: pytest.CaptureFixture[str]):
     text = output_of("00_run_rendered.py", capsys)
     assert text.startswith("good: 5 of 5 scans are placed")
@@ -47,6 +46,7 @@ def test_own_format(capsys: pytest.CaptureFixture[str]):
     assert "viewpoint  given" in text and "viewpoint  estimated" in text
 
 
+@pytest.mark.slow
 def test_view_graph(capsys: pytest.CaptureFixture[str]):
     text = output_of("03_view_graph.py", capsys)
     assert len(re.findall(r"^scan_\d\d = scan_\d\d  good", text, re.MULTILINE)) >= 4
@@ -69,6 +69,7 @@ def test_evaluate(capsys: pytest.CaptureFixture[str]):
     assert "of 5 scans: 3 right, 1 wrong, 1 unplaced" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("off_deg", "code"), [(0.0, 0), (10.0, 3)])
 def test_demo_succeeds_only_if_all_is_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, off_deg: float, code: int
@@ -81,5 +82,5 @@ def test_demo_succeeds_only_if_all_is_right(
     monkeypatch.setattr(job.pipeline, "run", run)
     demo = runpy.run_path(str(EXAMPLES / "demo.py"))["demo"]
     monkeypatch.setitem(demo.__globals__, "creature", lambda: creature(voxels=50))
-    for _ in range(2):  # a second demo in the same folder replaces the first
+    for _ in range(2 if code == 0 else 1):  # a second demo in the same folder replaces the first
         assert demo(tmp_path / "demo") == code

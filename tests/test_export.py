@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from scanweld.app import fuse as fuse_module
 from scanweld.app import job
 from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
@@ -27,14 +28,15 @@ from scanweld.io import (
 from scanweld.io.ply_body import decode_body
 from scanweld.io.ply_header import parse_header
 from scanweld.io.pose_formats import FORMATS, Frame, match_poses, read_any_poses
-from tests.command_line import error_line, scanweld
+from tests.command_line import COARSE, error_line, scanweld
 from tests.results import stub_run
-from tests.scenes import Scene, primitive_scene, scene_of
+from tests.scenes import Scene, primitive_scene, scene_of, write_scans
 
 pytestmark = pytest.mark.slow
 
 NAMES = ["scan_01", "scan_02", "scan_03", "scan_04"]
 EVERY_POSE = [word for form in FORMATS for word in ("--poses", form)]
+FUSE = ("fuse", "scans", "--config", "coarse.toml")
 
 
 @pytest.fixture(scope="session")
@@ -50,9 +52,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def model(scene: Scene) -> Path:
     """A model in the folder ``model`` of scans in the folder ``scans``."""
-    Path("scans").mkdir()
-    for scan in scene.scans:
-        write_scan_ply(Path("scans") / f"{scan.name}.ply", scan)
+    write_scans(Path("scans"), scene.scans)
+    Path("coarse.toml").write_text(COARSE)
     folder = Path("model")
     folder.mkdir()
     poses = scene.world_from_scan
@@ -199,8 +200,7 @@ def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[
     views = [
         view_of(box(), 90.0 * k, 25, pixels=70, model=CameraModel.ORTHOGRAPHIC) for k in range(4)
     ]
-    for scan in scene_of(box(), views).scans:
-        write_scan_ply(Path("scans") / f"{scan.name}.ply", scan)
+    write_scans(Path("scans"), scene_of(box(), views).scans)
     before = snapshot()
     for form in ("tum", "colmap", "nerfstudio"):
         assert scanweld("export", model, "--poses", "mlp", "--poses", form, "-o", "out") == 1
@@ -301,18 +301,15 @@ def distance_to_truth(scene: Scene, mesh: TriangleMesh) -> float:
     return float(np.quantile(KDTree(mesh.vertices).query(points)[0], 0.95)) / size
 
 
-@pytest.mark.parametrize("form", ["poses.json", "poses.tum.txt", "poses.mlp", "transforms.json"])
 def test_known_poses_are_fused_in_their_frame(
-    model: Path, scene: Scene, form: str, capsys: pytest.CaptureFixture[str]
+    model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
 ):
-    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
-    poses = model / form if form == "poses.json" else Path("out") / form
-    assert scanweld("fuse", "scans", "--poses", poses, "-o", "fused", "-q", "--unit", "mm") == 0
-    assert "given: all 4 scans are fused" in capsys.readouterr().out
-    assert distance_to_truth(scene, read_mesh("fused/model.ply")) < 0.02
-    found = read_poses("fused/poses.json").poses
-    for name, pose in scene.world_from_scan.items():
-        assert np.abs(found[name].matrix() - pose.matrix()).max() < 1e-9
+    poses = model / "poses.json"
+    assert scanweld(*FUSE, "--poses", poses, "-o", "fused", "-q", "--unit", "mm") == 0
+    out, err = capsys.readouterr()
+    assert "given: all 4 scans are fused" in out and err == ""
+    assert distance_to_truth(scene, read_mesh("fused/model.ply")) < 0.03
+    assert_true(scene, Path("fused/poses.json"))
     # What fuse makes is a model like any other, but that it says nothing of pairs.
     page = Path("fused/report.html").read_text(encoding="utf-8")
     assert "All 4 scans are fused with the poses that were given." in page
@@ -323,12 +320,39 @@ def test_known_poses_are_fused_in_their_frame(
     assert Path("again/poses.conf").read_text() and "note" not in capsys.readouterr().out
 
 
+def assert_true(scene: Scene, file: Path) -> None:
+    found = read_poses(file).poses
+    for name, pose in scene.world_from_scan.items():
+        assert np.abs(found[name].matrix() - pose.matrix()).max() < 1e-9
+
+
+@pytest.mark.parametrize("form", ["poses.tum.txt", "poses.mlp", "transforms.json"])
+def test_poses_of_any_format_are_fused_alike(
+    model: Path, scene: Scene, form: str, monkeypatch: pytest.MonkeyPatch
+):
+    """Of a scan or of its sensor, all come down to the same poses; what follows is seen above."""
+    posed: list[Pose] = []
+
+    def fused(_: object, poses: list[Pose], *__: object, **___: object) -> TriangleMesh:
+        posed.extend(poses)
+        return scene.mesh
+
+    monkeypatch.setattr(fuse_module, "fuse", fused)
+    monkeypatch.setattr(fuse_module, "write_html_report", lambda *_: None)
+    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
+    assert scanweld(*FUSE, "--poses", Path("out") / form, "-o", "fused", "-q") == 0
+    assert_true(scene, Path("fused/poses.json"))
+    for view in scene.views:
+        want = view.world_from_sensor.matrix()
+        assert min(np.abs(pose.matrix() - want).max() for pose in posed) < 1e-9
+
+
 def test_scans_without_a_pose_are_left_out_and_named(
     model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
 ):
     poses = {name: scene.world_from_scan[name].matrix().tolist() for name in NAMES[:3]}
     Path("some.json").write_text(json.dumps(poses))
-    assert scanweld("fuse", "scans", "--poses", "some.json", "-o", "fused", "-q") == 3
+    assert scanweld(*FUSE, "--poses", "some.json", "-o", "fused", "-q") == 3
     told = capsys.readouterr().out
     assert "partial: 3 of 4 scans" in told and "unplaced scan_04: no pose in some.json" in told
     assert read_poses("fused/poses.json").unplaced == {"scan_04": "no pose in some.json"}

@@ -1,13 +1,16 @@
-"""Kernels where they cannot be kept: a read-only installation and no home."""
+"""Compiled kernels: never stale, not compiled twice, and kept in a folder that can be written."""
 
-import logging
+import os
+import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from numba.core import config
 
+from scanweld.work import kernels, source
 from scanweld.work.kernels import provide_cache
 
 # Numba tries a folder by a temporary file in it; here all but our own are read-only.
@@ -23,6 +26,75 @@ def try_folder(*arguments, dir=None, **options):
 tempfile.TemporaryFile = try_folder
 """
 
+CALLER = """
+from numba import njit
+from scanweld.callee import twice
+from scanweld.constants import START
+
+@njit(cache=True)
+def total(x):
+    return START + twice(x)
+"""
+
+CALLEE = """
+from numba import njit
+
+@njit(cache=True)
+def twice(x):
+    return 2 * x
+"""
+
+ASK = """
+import scanweld.work.kernels
+from scanweld.caller import total
+print(total(10), len(total.stats.cache_hits), len(total.stats.cache_misses))
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package with our way to keep kernels, and two kernels in two files."""
+    package = tmp_path / "scanweld"
+    (package / "work").mkdir(parents=True)
+    for name in ("__init__.py", "kernels.py", "source.py"):
+        shutil.copy(source.PACKAGE / "work" / name, package / "work")
+    (package / "__init__.py").touch()
+    (package / "caller.py").write_text(CALLER, encoding="utf-8")
+    (package / "callee.py").write_text(CALLEE, encoding="utf-8")
+    (package / "constants.py").write_text("START = 1\n", encoding="utf-8")
+    return package
+
+
+def ask(package: Path) -> tuple[int, int, int]:
+    """What the kernel gives in a new process, how often it was found, and how often compiled."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(package.parent),
+        "NUMBA_CACHE_DIR": str(package.parent / "chosen"),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", ASK], env=environment, capture_output=True, text=True, check=True
+    )
+    result, hits, misses = map(int, done.stdout.split())
+    return result, hits, misses
+
+
+def test_a_kernel_follows_the_kernels_and_constants_of_other_files(package: Path):
+    assert ask(package) == (21, 0, 1)
+    assert ask(package) == (21, 1, 0), "nothing is compiled on the second run"
+    (package / "callee.py").write_text(CALLEE.replace("2 * x", "3 * x"), encoding="utf-8")
+    assert ask(package) == (31, 0, 1)
+    (package / "constants.py").write_text("START = 5\n", encoding="utf-8")
+    assert ask(package) == (35, 0, 1)
+    kept = list((package.parent / "chosen" / "scanweld").iterdir())
+    assert len(kept) == 3 and all(path.name.startswith(kernels.PREFIX) for path in kept)
+
+
+def test_the_digest_covers_what_kernels_import_and_nothing_else():
+    found = {path.relative_to(source.PACKAGE).as_posix() for path in source.kernel_files()}
+    assert {"evidence/step.py", "evidence/icp.py", "geometry/arrays.py"} <= found
+    assert not any(name.startswith(("app/", "pipeline/")) for name in found)
+
 
 def test_scanweld_can_be_imported_where_kernels_cannot_be_kept():
     code = READ_ONLY + "import scanweld, numba; print(numba.config.CACHE_DIR)"
@@ -32,10 +104,17 @@ def test_scanweld_can_be_imported_where_kernels_cannot_be_kept():
     assert folder.name.startswith("scanweld-kernels-") and not folder.exists()
 
 
-def test_where_kernels_can_be_kept_nothing_is_said(
+def test_folders_of_earlier_states_go_when_they_are_old(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
-    with caplog.at_level(logging.WARNING):
-        assert provide_cache() is None
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    now, week = time.time(), 7 * 24 * 3600
+    for age in range(6):
+        folder = tmp_path / "scanweld" / f"{kernels.PREFIX}{age}"
+        folder.mkdir(parents=True)
+        os.utime(folder, (now, now - age * week))
+    own = provide_cache(str(tmp_path))
+    assert str(own) == vars(config)["CACHE_DIR"]
+    kept = {path.name.removeprefix(kernels.PREFIX) for path in own.parent.iterdir() if path != own}
+    assert kept == {"0", "1", "2"} and own.is_dir()
     assert not caplog.records

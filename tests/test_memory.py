@@ -19,19 +19,16 @@ from scanweld.app.memory import (
     points_within,
     workers_within,
 )
-from scanweld.config import PrepareConfig
+from scanweld.config import Config, FusionConfig, PrepareConfig
 from scanweld.errors import BudgetError
 from scanweld.evaluation.primitives import sphere
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
-from scanweld.io import write_scan_ply
 from scanweld.preparation import prepare
 from scanweld.preparation.thinning import thinned
 from tests.prepared import moved
-from tests.scenes import creature_scene, random_motion
-
-pytestmark = pytest.mark.slow
+from tests.scenes import creature_scene, random_motion, write_scans
 
 
 def a_scan(model: CameraModel = CameraModel.PINHOLE) -> RangeScan:
@@ -209,16 +206,15 @@ def test_what_belongs_to_a_point_stays_with_it():
     np.testing.assert_array_equal(scan.points[smaller.confidence.astype(int)], smaller.points)
 
 
+@pytest.mark.slow
 def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    folder = tmp_path / "scans"
-    folder.mkdir()
-    for scan in creature_scene(2, pixels=60.0).scans:
-        write_scan_ply(folder / f"{scan.name}.ply", scan)
-    write_scan_ply(folder / "large.ply", replace(a_scan(), name="large"))
+    small = creature_scene(2, pixels=60.0).scans
+    folder = write_scans(tmp_path / "scans", [*small, replace(a_scan(), name="large")])
+    config = Config(fusion=FusionConfig(max_voxels_across=60))
     monkeypatch.setattr(job, "points_within", lambda budget, paths: 1200)
-    run_job([folder], tmp_path / "model", memory=10_000 * MEGABYTE, workers=1)
+    run_job([folder], tmp_path / "model", config, memory=10_000 * MEGABYTE, workers=1)
     told = json.loads((tmp_path / "model" / "report.json").read_text())["scans"]
     assert told["large"]["num_points"] <= 1200
     assert any("thinned from" in note for note in told["large"]["notes"])
@@ -227,4 +223,4 @@ def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     assert told["large"]["verdict"] != "unplaced"
     page = (tmp_path / "model" / "report.html").read_bytes()
     assert report_job(tmp_path / "model").read_bytes() == page
-    assert fuse_job([folder], tmp_path / "model", tmp_path / "fused").mesh is not None
+    assert fuse_job([folder], tmp_path / "model", tmp_path / "fused", config).mesh is not None

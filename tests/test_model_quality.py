@@ -14,11 +14,11 @@ from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, view_of
 from scanweld.fusion import fuse
+from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.color import exposure_gains
 from scanweld.fusion.noise import scan_noise
 from scanweld.fusion.posed_image import PosedImage, pose_image
 from scanweld.fusion.sheets import second_sheets, without_second_sheets
-from scanweld.fusion.support import Support
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals, smoothed_normals
 from scanweld.geometry.pose import Pose
@@ -26,6 +26,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import read_mesh, write_mesh_ply
 from scanweld.preparation import prepare
+from tests.meshes import is_closed, joined
 
 pytestmark = pytest.mark.slow
 
@@ -68,11 +69,6 @@ def ball(noise: float = 0.0) -> Posed:
 def cup() -> Posed:
     """A ball of which the lower part was not seen."""
     return scanned(sphere(RADIUS), [(0, 50), (120, 50), (240, 50), (0, 89)])
-
-
-def is_closed(mesh: TriangleMesh) -> bool:
-    edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    return set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
 
 
 def border_points(mesh: TriangleMesh) -> np.ndarray:
@@ -197,7 +193,7 @@ def test_sheets_that_share_a_corner_are_two():
     plane = np.stack([x, y, np.zeros(9)], axis=1).astype(np.float64)
     vertices = np.concatenate([plane, plane - [0.0, 0.0, 1.5]])
     other = np.where(sheet == 0, 0, sheet + 9)
-    support = Support(count=np.repeat([2, 1], 9), stdev=np.full(18, 0.1))
+    support = Agreement(count=np.repeat([2, 1], 9), stdev=np.full(18, 0.1))
     faces = np.concatenate([sheet, other])
     joined = smoothed_normals(vertices, faces, 1)
     assert (second_sheets(vertices, faces, joined, 1.0) < 0).all()
@@ -210,10 +206,7 @@ def test_defects_are_counted():
     good = fuse(*ball(), OPEN)
     voxel = ball()[0][0].resolution
     assert surface_defects(good, voxel).borders == 0
-    both = TriangleMesh(
-        vertices=np.concatenate([good.vertices, (1 + 1.5 * voxel / RADIUS) * good.vertices]),
-        faces=np.concatenate([good.faces, good.faces + len(good.vertices)]),
-    )
+    both = joined(good, replace(good, vertices=(1 + 1.5 * voxel / RADIUS) * good.vertices))
     assert surface_defects(both, voxel).double > 0.9 * len(both.vertices)
     pricked = replace(good, faces=np.delete(good.faces, [5, 4000], axis=0))
     assert surface_defects(pricked, voxel).cracks == 2
@@ -230,7 +223,7 @@ def test_holes_are_closed_and_what_closes_them_is_marked(holes: str):
     scans, poses = cup()
     left_open = fuse(scans, poses, OPEN)
     closed = fuse(scans, poses, OPEN.model_copy(update={"holes": holes}))
-    assert not is_closed(left_open) and is_closed(closed)
+    assert not is_closed(left_open.faces) and is_closed(closed.faces)
     assert closed.filled is not None and closed.support is not None and closed.stdev is not None
     np.testing.assert_array_equal(closed.filled, closed.support == 0)
     np.testing.assert_array_equal(closed.filled, np.isnan(closed.stdev))
@@ -242,33 +235,24 @@ def test_holes_are_closed_and_what_closes_them_is_marked(holes: str):
         assert not closed.filled[closed.vertices[:, 2] > depth + 22].any()
     seen = np.linalg.norm(closed.vertices[~closed.filled], axis=1)
     assert np.abs(seen - RADIUS).max() < voxel
-    volume = (
-        np.einsum(
-            "fk,fk->",
-            face_normals(closed.vertices, closed.faces),
-            closed.vertices[closed.faces[:, 0]],
-        )
-        / 6.0
-    )
+    outward = face_normals(closed.vertices, closed.faces)
+    volume = (outward * closed.vertices[closed.faces[:, 0]]).sum() / 6.0
     assert volume > 0.5 * 4 / 3 * np.pi * RADIUS**3
 
 
 def test_what_was_seen_empty_is_not_filled():
     """Two balls with a gap that was seen through: no membrane joins them."""
-    one, two = sphere(25.0), sphere(25.0)
-    pair = TriangleMesh(
-        vertices=np.concatenate([one.vertices - APART, two.vertices + APART]),
-        faces=np.concatenate([one.faces, two.faces + len(one.vertices)]),
-    )
+    one = sphere(25.0)
+    pair = joined(*(replace(one, vertices=one.vertices + shift) for shift in (-APART, APART)))
     scans, poses = scanned(pair, [(90, 10), (210, 10), (330, 10), (0, 89)], pixels=150.0)
     mesh = fuse(scans, poses, FusionConfig(holes="fill"))
-    assert is_closed(mesh)
+    assert is_closed(mesh.faces)
     assert np.abs(mesh.vertices[:, 0]).min() > 4.0
 
 
 def test_watertight_closes_and_stays_closed_when_decimated():
     mesh = fuse(*cup(), FusionConfig(watertight=True, faces=2000, smooth=2))
-    assert is_closed(mesh)
+    assert is_closed(mesh.faces)
     assert abs(len(mesh.faces) - 2000) < 60
     assert mesh.filled is not None and mesh.filled.any() and not mesh.filled.all()
 
@@ -304,10 +288,7 @@ def test_smoothing_takes_noise_away_and_keeps_size_and_border():
 
 def test_component_largest_leaves_one_piece():
     small = sphere(15.0)
-    both = TriangleMesh(
-        vertices=np.concatenate([sphere(RADIUS).vertices, small.vertices + 3 * APART]),
-        faces=np.concatenate([sphere(RADIUS).faces, small.faces + len(sphere(RADIUS).vertices)]),
-    )
+    both = joined(sphere(RADIUS), replace(small, vertices=small.vertices + 3 * APART))
     posed = scanned(both, [(90, 20), (210, 20), (330, 20)])
     assert fuse(*posed, OPEN).vertices[:, 0].max() > 80
     largest = fuse(*posed, FusionConfig(component="largest"))

@@ -12,16 +12,15 @@ from rich.console import Console
 import scanweld
 from scanweld.app.json_lines import EVENTS, event_line
 from scanweld.app.progress import Drawing, bars_on
-from scanweld.config import Config
+from scanweld.config import Config, FusionConfig
 from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import write_scan_ply
+from scanweld.reconstruction import Reconstruction
 from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+from tests.command_line import COARSE
 from tests.command_line import scanweld as command
-from tests.scenes import creature_scene, scene_of
-
-pytestmark = pytest.mark.slow
+from tests.scenes import creature_scene, scene_of, write_scans
 
 ESCAPE = "\x1b"
 Told = list[dict[str, object]]
@@ -41,17 +40,21 @@ def coarse_scans() -> list[RangeScan]:
 
 
 @pytest.fixture(scope="module")
-def events() -> list[Event]:
+def told_run() -> tuple[list[Event], Reconstruction]:
+    """What a run told, and what came out."""
     told: list[Event] = []
-    scanweld.run(coarse_scans(), Config(), progress=told.append)
-    return told
+    config = Config(fusion=FusionConfig(max_voxels_across=60))
+    result = scanweld.run(coarse_scans(), config, workers=1, progress=told.append)
+    return told, result
 
 
 def refused(events: Sequence[Event]) -> dict[str, str]:
     return {event.scan: event.reason for event in events if isinstance(event, ScanRefused)}
 
 
-def test_stages_start_advance_and_finish_in_turn(events: Sequence[Event]):
+@pytest.mark.slow
+def test_stages_start_advance_and_finish_in_turn(told_run: tuple[list[Event], Reconstruction]):
+    events, _ = told_run
     current, done, finished = "", 0, []
     for event in events:
         match event:
@@ -73,9 +76,9 @@ def test_stages_start_advance_and_finish_in_turn(events: Sequence[Event]):
     assert pairs.counts == {"pairs": 6}
 
 
-def test_scans_are_refused_once_and_as_it_happens(events: Sequence[Event]):
-    scans = coarse_scans()
-    result = scanweld.run(scans, Config())
+@pytest.mark.slow
+def test_scans_are_refused_once_and_as_it_happens(told_run: tuple[list[Event], Reconstruction]):
+    events, result = told_run
     told = refused(events)
     assert told == dict(result.unplaced) and {"large", "twice"} <= set(told)
     assert sum(isinstance(event, ScanRefused) for event in events) == len(told)
@@ -84,26 +87,26 @@ def test_scans_are_refused_once_and_as_it_happens(events: Sequence[Event]):
 
 
 def test_the_library_says_nothing_itself(capsys: pytest.CaptureFixture[str]):
-    scanweld.run(coarse_scans()[:2], Config(), progress=lambda event: None)
+    scanweld.run(coarse_scans()[:2], Config(), workers=1, progress=lambda event: None)
     assert capsys.readouterr() == ("", "")
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Scans, one of them broken."""
+    """Scans, one of them broken, and settings for a coarse model of the others."""
     monkeypatch.chdir(tmp_path)
-    folder = tmp_path / "scans"
-    folder.mkdir()
-    for scan in coarse_scans()[:3]:
-        write_scan_ply(folder / f"{scan.name}.ply", scan)
+    folder = write_scans(tmp_path / "scans", coarse_scans()[:2])
     (folder / "broken.ply").write_text("not a scan")
+    Path("coarse.toml").write_text(COARSE)
     return folder
 
 
+@pytest.mark.slow
 def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ):
-    code = command("run", folder, "-o", "model", "--json")
+    coarse = "--workers", "1", "--config", "coarse.toml"
+    code = command("run", folder, "-o", "model", "--json", *coarse)
     out, err = capsys.readouterr()
     lines: Told = [json.loads(line) for line in out.splitlines()]
     assert err == "" and lines[0] == {"event": "stage_started", "stage": "read"}
@@ -111,7 +114,7 @@ def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     report = json.loads(Path("model/report.json").read_text())
     assert end["event"] == "finished" and end["exit_code"] == code == 3
     assert all(end[key] == report[key] for key in ("verdict", "exit_code", "reasons"))
-    assert (end["scans"], end["output"]) == (4, "model")
+    assert (end["scans"], end["output"]) == (3, "model")
     assert {line["event"] for line in lines} == set(EVENTS.values())
     names = [line["stage"] for line in lines if line["event"] == "stage_finished"]
     assert names[0] == "read" and names[-1] == "report"
@@ -119,10 +122,14 @@ def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     assert "broken.ply" in str(told["reason"])
     assert lines.index(told) < lines.index({"event": "stage_started", "stage": "prepare"})
     # The poses that were found, fused: the same words.
-    assert command("fuse", folder, "--poses", "model/poses.json", "-o", "fused", "--json") == 3
+    fuse = "fuse", folder, "--poses", "model/poses.json", "--config", "coarse.toml"
+    assert command(*fuse, "-o", "fused", "--json") == 3
     again = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert again[-1]["event"] == "finished" and again[-1]["verdict"] == "partial"
     assert "broken" in {line.get("scan") for line in again}
+    # And told to nobody.
+    assert command(*fuse, "-o", "quiet", "-q") == 3
+    assert capsys.readouterr().err == ""
 
 
 def test_an_error_is_a_line_on_stderr_and_no_verdict(
@@ -138,15 +145,14 @@ def test_an_error_is_a_line_on_stderr_and_no_verdict(
     assert err.startswith("scanweld: error: ") and err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_without_a_terminal_there_are_plain_lines(folder: Path, capsys: pytest.CaptureFixture[str]):
-    assert command("run", folder, "-o", "model") == 3
+    assert command("run", folder, "-o", "model", "--workers", "1", "--config", "coarse.toml") == 3
     out, err = capsys.readouterr()
     lines = err.splitlines()
     assert ESCAPE not in out + err and all(line.startswith("scanweld: ") for line in lines)
     assert [line for line in lines if "refused broken" in line] == lines[:1]
-    assert any(line.startswith("scanweld: pairs: pairs 3 (") for line in lines)
-    assert command("run", folder, "-o", "quiet", "-q") == 3
-    assert capsys.readouterr().err == ""
+    assert any(line.startswith("scanweld: pairs: pairs 1 (") for line in lines)
 
 
 def test_on_a_terminal_there_is_a_bar_for_each_stage():

@@ -15,17 +15,10 @@ from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
 from scanweld.work.progress import NoCache, silent
 from scanweld.work.stage_log import Stages
+from tests.meshes import joined
 from tests.scenes import small_creature
 
 NOISE = NoiseModel(depth_diameters=2e-4)
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    return TriangleMesh(
-        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-        faces=np.concatenate([mesh.faces + k for mesh, k in zip(meshes, starts[:-1], strict=True)]),
-    )
 
 
 def slab(mesh: TriangleMesh, width: float, thickness: float = 2.0) -> TriangleMesh:
@@ -62,8 +55,9 @@ def test_what_is_left_out_is_the_table_and_nothing_else(azimuth_deg: float):
     mesh = small_creature()
     view = view_of(on_table(), azimuth_deg, 30.0, 20.0, pixels=180.0)
     scan = scan_mesh(on_table(), view.camera, view.world_from_sensor, NOISE, 1)
-    assert stands_on_support(prepare(scan, PrepareConfig()))
-    spacing = prepare(scan, PrepareConfig()).resolution
+    prepared = prepare(scan, PrepareConfig())
+    assert stands_on_support(prepared)
+    spacing = prepared.resolution
     left_out = find_support(scan.points, spacing)
     assert left_out is not None
     height = view.world_from_sensor.apply(scan.points)[:, 2] - mesh.vertices[:, 2].min()
@@ -109,11 +103,8 @@ def test_a_table_in_most_scans_is_left_out_of_these():
     scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
     scans.append(seen(small_creature(), 270.0))
     prepared = taken_in(scans).prepared
-    assert {scan.name for scan in prepared if scan.is_without_support} == {
-        "at 0",
-        "at 90",
-        "at 180",
-    }
+    without = {scan.name for scan in prepared if scan.is_without_support}
+    assert without == {"at 0", "at 90", "at 180"}
 
 
 def test_a_plane_in_few_scans_belongs_to_the_object():

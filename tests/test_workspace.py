@@ -1,5 +1,8 @@
 """The output folder is whole or not there, and an earlier one survives whatever happens."""
 
+import hashlib
+import io
+import pickle
 import signal
 import subprocess
 import sys
@@ -13,6 +16,7 @@ from scanweld.app.workspace import Workspace, work_folder
 from scanweld.errors import InputError, WriteError
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
+from scanweld.work.records import Records
 
 
 @pytest.fixture
@@ -250,22 +254,22 @@ def test_output_behind_a_link_is_replaced_and_the_link_stays(old_output: Path):
 
 def test_cached_scan_comes_back_equal_and_frozen(tmp_path: Path):
     scan = RangeScan(name="a", points=np.arange(12.0).reshape(4, 3))
-    cache = FileCache(tmp_path)
+    cache = FileCache(tmp_path, Records(RangeScan))
     assert cache.get("ab") is None and cache.is_empty()
     cache.put("ab", (scan, Pose.identity()))
     kept = cache.get("ab")
     assert isinstance(kept, tuple)
     assert kept[0].content_hash() == scan.content_hash()
     assert not kept[0].points.flags.writeable and not kept[1].rotation.flags.writeable
-    assert [path.name for path in tmp_path.iterdir()] == ["ab.pkl"]
+    assert [path.name for path in tmp_path.iterdir()] == ["ab.record"]
 
 
 @pytest.mark.parametrize("length", [0, 1, 31, 32, 33, -1])
 def test_truncated_entry_counts_as_absent(tmp_path: Path, length: int):
     cache = FileCache(tmp_path)
-    cache.put("ab", list(range(100)))
-    whole = (tmp_path / "ab.pkl").read_bytes()
-    (tmp_path / "ab.pkl").write_bytes(whole[:length])
+    cache.put("ab", tuple(range(100)))
+    whole = (tmp_path / "ab.record").read_bytes()
+    (tmp_path / "ab.record").write_bytes(whole[:length])
     assert cache.get("ab") is None
     cache.put("ab", "again")
     assert cache.get("ab") == "again"
@@ -274,10 +278,26 @@ def test_truncated_entry_counts_as_absent(tmp_path: Path, length: int):
 def test_damaged_entry_counts_as_absent(tmp_path: Path):
     cache = FileCache(tmp_path)
     cache.put("ab", "value")
-    data = bytearray((tmp_path / "ab.pkl").read_bytes())
+    data = bytearray((tmp_path / "ab.record").read_bytes())
     data[-5] ^= 1
-    (tmp_path / "ab.pkl").write_bytes(data)
+    (tmp_path / "ab.record").write_bytes(data)
     assert cache.get("ab") is None
+
+
+class Evil:
+    """Runs code when it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return (pytest.fail, ("code of the cache was run",))
+
+
+@pytest.mark.parametrize("suffix", ["record", "pkl"])
+def test_a_folder_from_elsewhere_cannot_run_code(tmp_path: Path, suffix: str):
+    objects = io.BytesIO()
+    np.savez(objects, tree=np.array([Evil()], dtype=object))
+    for body in (pickle.dumps(Evil()), objects.getvalue()):
+        (tmp_path / f"ab.{suffix}").write_bytes(hashlib.sha256(body).digest() + body)
+        assert FileCache(tmp_path).get("ab") is None
 
 
 def test_keys_stay_inside_the_folder(tmp_path: Path):

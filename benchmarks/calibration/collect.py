@@ -1,37 +1,25 @@
-"""Run the main job on the sets of the calibration, and hold all poses that it names to the truth.
-
-The sets are a table of ``benchmarks.paper.study``, which keeps what is finished.
-"""
+"""Run the main job on the sets of the calibration, and hold all poses that it names to truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from benchmarks.calibration.scenes import make_set
 from benchmarks.judging.trial import is_right_pair
-from benchmarks.paper.study import Record, Result, Unit
+from benchmarks.kept import Kept, Result, Unit
 from benchmarks.virtual.scene import Scene
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
-from scanweld.geometry.pose import Pose
 from scanweld.pipeline.run import run
 from scanweld.reconstruction import PairReport, Reconstruction
 
-CODE = (
-    "src/scanweld/**/*.py",
-    "benchmarks/virtual/*.py",
-    "benchmarks/judging/trial.py",
-    *(f"benchmarks/calibration/{name}.py" for name in ("solids", "scenes", "collect")),
-)
-"""Sets that other code measured are measured again."""
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
 """The defaults; nobody looks at the model."""
-NUM_SETS, NUM_QUICK = 200, 6
+NUM_SETS, NUM_QUICK = 200, 2
 
 
 @dataclass(kw_only=True)
-class Sets:
+class Sets(Kept):
     """The sets by seed."""
 
     num_sets: int = NUM_SETS
@@ -40,7 +28,7 @@ class Sets:
 
     def units(self, quick: bool) -> list[Unit]:
         """All sets; a few if quick."""
-        return [{"seed": seed} for seed in range(NUM_QUICK if quick else self.num_sets)]
+        return [{"seed": seed} for seed in range(min(self.num_sets, NUM_QUICK if quick else 10**6))]
 
     def measure(self, unit: Unit) -> Result:
         """Grounds of every pair and scan of a set that has a pose, and whether it is right."""
@@ -49,14 +37,8 @@ class Sets:
             found = run(scene.scans, CONFIG, workers=1)
         except ScanweldError as error:
             return {"error": str(error), "pairs": [], "scans": []}
-        return {
-            "pairs": [_pair(pair, scene) for pair in found.pairs if pair.i_from_j is not None],
-            "scans": _scans(found, scene),
-        }
-
-    def page(self, records: Sequence[Record], out: Path) -> str:
-        """Nothing: the page is written by its blocks."""
-        return ""
+        pairs = [_pair(pair, scene) for pair in found.pairs if pair.i_from_j is not None]
+        return {"pairs": pairs, "scans": _scans(found, scene)}
 
 
 def _pair(pair: PairReport, scene: Scene) -> dict[str, Any]:
@@ -68,7 +50,7 @@ def _pair(pair: PairReport, scene: Scene) -> dict[str, Any]:
         "observability": pair.observability,
         "accepted": pair.accepted,
         "grounds": dict(pair.grounds),
-        "right": _is_right(pair.i, pair.j, pair.i_from_j, scene),
+        "right": is_right_pair(pair.i, pair.j, pair.i_from_j, scene),
     }
 
 
@@ -94,19 +76,13 @@ def _largest_agreeing(
     found: Reconstruction, component: Sequence[str], scene: Scene
 ) -> frozenset[str]:
     """The most scans of a component that are right as one of them sees it; none if it is alone."""
-
-    def right_beside(i: str) -> frozenset[str]:
-        from_world = found.poses[i].inverse()
-        return frozenset(
-            j for j in component if j != i and _is_right(i, j, from_world @ found.poses[j], scene)
+    beside = {
+        i: frozenset(
+            j
+            for j in component
+            if j != i and is_right_pair(i, j, found.poses[i].inverse() @ found.poses[j], scene)
         )
-
-    largest = max(component, key=lambda i: len(right_beside(i)))
-    beside = right_beside(largest)
-    return beside | {largest} if beside else frozenset()
-
-
-def _is_right(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool:
-    """Whether a pose is the true one, and what the two scans show determines it."""
-    is_open = bool({i, j} & scene.is_open)
-    return not is_open and is_right_pair(i, j, i_from_j, scene)
+        for i in component
+    }
+    largest = max(component, key=lambda i: len(beside[i]))
+    return beside[largest] | {largest} if beside[largest] else frozenset()

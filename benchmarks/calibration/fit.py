@@ -1,7 +1,7 @@
 """Fit the calibrated model: curves that never fall, and frequencies counted on held-out objects."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -21,19 +21,12 @@ MIN_COUNTED = 20
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Examples:
-    """What was seen, to learn from.
+    """What was seen, to learn from."""
 
-    Attributes:
-        names: Of the F grounds.
-        grounds: (N, F).
-        is_right: (N,).
-        groups: (N,) number of the set that each comes from: sets have their own objects.
-    """
-
-    names: tuple[str, ...]
-    grounds: FloatArray
-    is_right: BoolArray
-    groups: IntArray
+    names: tuple[str, ...]  # Of the F grounds
+    grounds: FloatArray  # (N, F)
+    is_right: BoolArray  # (N,)
+    groups: IntArray  # (N,) number of the set that each comes from: sets have their own objects
 
     def __len__(self) -> int:
         return len(self.is_right)
@@ -44,8 +37,8 @@ class Examples:
 
     def only(self, kept: BoolArray) -> "Examples":
         """Some of them."""
-        return Examples(
-            names=self.names,
+        return replace(
+            self,
             grounds=self.grounds[kept],
             is_right=self.is_right[kept],
             groups=self.groups[kept],
@@ -53,13 +46,9 @@ class Examples:
 
     def without(self, name: str) -> "Examples":
         """All of them, one ground left out."""
-        kept = [k for k, other in enumerate(self.names) if other != name]
-        return Examples(
-            names=tuple(self.names[k] for k in kept),
-            grounds=self.grounds[:, kept],
-            is_right=self.is_right,
-            groups=self.groups,
-        )
+        k = self.names.index(name)
+        names = self.names[:k] + self.names[k + 1 :]
+        return replace(self, names=names, grounds=np.delete(self.grounds, k, axis=1))
 
 
 def make_examples(
@@ -77,13 +66,13 @@ def make_examples(
 
 def fit(examples: Examples) -> Model:
     """Curves from all examples; frequencies of sums that curves from other objects gave."""
-    held_out = np.zeros(len(examples))
+    totals = np.zeros(len(examples))
     for fold in folds(examples):
-        curves = fit_curves(examples.only(~fold))
-        held_out[fold] = _totals(curves, examples.only(fold))
-    return Model(
-        curves=fit_curves(examples), frequencies=count_frequencies(held_out, examples.is_right)
-    )
+        curves, held_out = fit_curves(examples.only(~fold)), examples.only(fold)
+        columns = zip(examples.names, held_out.grounds.T, strict=True)
+        totals[fold] = np.sum([curves[name].at(column) for name, column in columns], axis=0)
+    frequencies = count_frequencies(totals, examples.is_right)
+    return Model(curves=fit_curves(examples), frequencies=frequencies)
 
 
 def held_out_probabilities(examples: Examples) -> FloatArray:
@@ -96,16 +85,21 @@ def held_out_probabilities(examples: Examples) -> FloatArray:
 
 
 def folds(examples: Examples) -> list[BoolArray]:
-    """Parts of the examples that share no set."""
+    """Parts of the examples that share no set; none that leaves nothing to learn from."""
     _, order = np.unique(examples.groups, return_inverse=True)
-    return [order % NUM_FOLDS == k for k in range(NUM_FOLDS)]
+    parts = (order % NUM_FOLDS == k for k in range(NUM_FOLDS))
+    return [part for part in parts if not part.all()]
 
 
 def fit_curves(examples: Examples) -> dict[str, Curve]:
-    """Logistic regression on ramps between knots, none of which may go down."""
-    knots = [_knots(column) for column in examples.grounds.T]
+    """Logistic regression on ramps from each knot to the next, none of which may go down."""
+    knots = [np.unique(np.quantile(column, QUANTILES)) for column in examples.grounds.T]
     ramps = np.concatenate(
-        [_ramps(x, at) for x, at in zip(examples.grounds.T, knots, strict=True)], axis=1
+        [
+            np.clip((x[:, None] - at[:-1]) / np.diff(at), 0.0, 1.0)
+            for x, at in zip(examples.grounds.T, knots, strict=True)
+        ],
+        axis=1,
     )
     sign = np.where(examples.is_right, -1.0, 1.0)
 
@@ -121,68 +115,24 @@ def fit_curves(examples: Examples) -> dict[str, Curve]:
     steps = np.split(weights[1:], np.cumsum([len(at) - 1 for at in knots])[:-1])
     values = [np.r_[0.0, np.cumsum(step)] for step in steps]
     values[0] = values[0] + weights[0]
-    return {
-        name: Curve(knots=at, values=value)
-        for name, at, value in zip(examples.names, knots, values, strict=True)
-    }
+    named = zip(examples.names, knots, values, strict=True)
+    return {name: Curve(knots=at, values=value) for name, at, value in named}
 
 
 def count_frequencies(totals: FloatArray, is_right: BoolArray) -> Curve:
     """How often what has such a sum is right: isotonic regression of Laplace's estimate."""
     order = np.argsort(totals, kind="stable")
-    count = max(len(totals) // MIN_COUNTED, 1)
-    pools: list[_Pool] = []
-    for part in np.array_split(order, count):
-        pools.append(
-            _Pool(total=totals[part].sum(), right=int(is_right[part].sum()), count=len(part))
-        )
-        while len(pools) > 1 and not _rises(pools[-2], pools[-1]):
+    pools: list[FloatArray] = []
+    for part in np.array_split(order, max(len(totals) // MIN_COUNTED, 1)):
+        pools.append(np.array([totals[part].sum(), is_right[part].sum(), len(part)]))
+        while len(pools) > 1 and not np.all(_point(pools[-2]) < _point(pools[-1])):
             last = pools.pop()
-            pools[-1] = pools[-1].with_all_of(last)
-    return Curve(
-        knots=np.array([pool.place for pool in pools]),
-        values=np.array([pool.frequency for pool in pools]),
-    )
+            pools[-1] = pools[-1] + last
+    places, frequencies = np.array([_point(pool) for pool in pools]).T
+    return Curve(knots=places, values=frequencies)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class _Pool:
-    """Examples that are counted together."""
-
-    total: float
-    right: int
-    count: int
-
-    @property
-    def place(self) -> float:
-        return self.total / self.count
-
-    @property
-    def frequency(self) -> float:
-        return (self.right + 1) / (self.count + 2)
-
-    def with_all_of(self, other: "_Pool") -> "_Pool":
-        return _Pool(
-            total=self.total + other.total,
-            right=self.right + other.right,
-            count=self.count + other.count,
-        )
-
-
-def _rises(before: _Pool, after: _Pool) -> bool:
-    return before.place < after.place and before.frequency < after.frequency
-
-
-def _totals(curves: Mapping[str, Curve], examples: Examples) -> FloatArray:
-    columns = zip(examples.names, examples.grounds.T, strict=True)
-    return np.sum([curves[name].at(column) for name, column in columns], axis=0)
-
-
-def _knots(column: FloatArray) -> FloatArray:
-    return np.unique(np.quantile(column, QUANTILES))
-
-
-def _ramps(x: FloatArray, knots: FloatArray) -> FloatArray:
-    """(N, K - 1) from 0 to 1 between each knot and the next."""
-    low, high = knots[:-1], knots[1:]
-    return np.clip((x[:, None] - low) / (high - low), 0.0, 1.0)
+def _point(pool: FloatArray) -> FloatArray:
+    """Mean sum and frequency of examples that are counted together: sum, number right, number."""
+    total, right, count = pool
+    return np.array([total / count, (right + 1) / (count + 2)])

@@ -10,11 +10,11 @@ import numpy as np
 
 from benchmarks.calibration.collect import CONFIG
 from benchmarks.calibration.fit import Examples, fit, held_out_probabilities, make_examples
-from benchmarks.paper.study import Record
-from scanweld.confidence.assess import as_held, close_open
-from scanweld.confidence.links import links
+from benchmarks.kept import CALIBRATED, Record, code_digest
+from benchmarks.scores import Stated
+from scanweld.confidence.assess import cap_by_links, cap_undecided
 from scanweld.confidence.model import Calibration
-from scanweld.geometry.arrays import FloatArray
+from scanweld.confidence.ties import ties_of
 from scanweld.geometry.pose import Pose
 from scanweld.graph.view_graph import Component
 from scanweld.pairs.result import PairKind, PairResult
@@ -23,21 +23,13 @@ from scanweld.pairs.verdict import no_pose
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Learned:
-    """What all sets together say.
+    """What all sets together say."""
 
-    Attributes:
-        calibration: The models.
-        pairs: Examples of pairs,
-        scans: of scans, with the held-out confidences of their pairs in their links.
-        pair_confidence: (N,) held-out confidence of the pairs,
-        scan_confidence: (M,) of the scans.
-    """
-
-    calibration: Calibration
-    pairs: Examples
-    scans: Examples
-    pair_confidence: FloatArray
-    scan_confidence: FloatArray
+    calibration: Calibration  # The models
+    pairs: Examples  # Of pairs
+    scans: Examples  # Of scans, with the held-out confidences of their pairs in their links
+    stated_pairs: Stated  # Held-out confidences of the pairs
+    stated_scans: Stated  # Held-out confidences of the scans
 
 
 def learn(records: Sequence[Record], command: str) -> Learned:
@@ -47,23 +39,19 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         records: Of ``Sets``.
         command: That collected them.
     """
-    rows = [(record.unit["seed"], pair) for record in records for pair in record.result["pairs"]]
-    pairs = make_examples(
-        [pair["grounds"] for _, pair in rows],
-        [pair["right"] for _, pair in rows],
-        [seed for seed, _ in rows],
-    )
-    probability = held_out_probabilities(pairs)
-    pair_confidence = np.array(
-        [
-            close_open(float(p), _as_told(pair), pair["grounds"], CONFIG)
-            for p, (_, pair) in zip(probability, rows, strict=True)
-        ]
-    )
-    scans = _scan_examples(records, pair_confidence)
+    told = [pair for record in records for pair in record.result["pairs"]]
+    groups = [record.unit["seed"] for record in records for _ in record.result["pairs"]]
+    pairs = make_examples([p["grounds"] for p in told], [p["right"] for p in told], groups)
+    probabilities = zip(held_out_probabilities(pairs).tolist(), told, strict=True)
+    confidences = [
+        cap_undecided(p, _as_told(pair), pair["grounds"], CONFIG) for p, pair in probabilities
+    ]
+    scans = _scan_examples(records, confidences)
+    held = zip(held_out_probabilities(scans).tolist(), scans.rows(), strict=True)
     digest = hashlib.sha256(json.dumps([record.result for record in records]).encode())
     made = {
         "command": command,
+        "code": code_digest(CALIBRATED),
         "sets": len(records),
         "pairs": len(pairs),
         "scans": len(scans),
@@ -73,12 +61,9 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         calibration=Calibration(pair=fit(pairs), scan=fit(scans), made=made),
         pairs=pairs,
         scans=scans,
-        pair_confidence=pair_confidence,
-        scan_confidence=np.array(
-            [
-                as_held(float(p), row, CONFIG)
-                for p, row in zip(held_out_probabilities(scans), scans.rows(), strict=True)
-            ]
+        stated_pairs=Stated(np.array(confidences), pairs.is_right),
+        stated_scans=Stated(
+            np.array([cap_by_links(p, row, CONFIG) for p, row in held]), scans.is_right
         ),
     )
 
@@ -89,12 +74,12 @@ def _as_told(pair: Mapping[str, Any]) -> PairResult:
     return replace(no_pose(0, 1, ""), kind=kind, observability=observability)
 
 
-def _scan_examples(records: Sequence[Record], pair_confidence: FloatArray) -> Examples:
-    left = iter(pair_confidence.tolist())
+def _scan_examples(records: Sequence[Record], pair_confidences: Sequence[float]) -> Examples:
+    left = iter(pair_confidences)
     rows: list[tuple[dict[str, float], bool, int]] = []
     for record in records:
         confidence = {(p["i"], p["j"]): next(left) for p in record.result["pairs"]}
-        accepted = {(p["i"], p["j"]) for p in record.result["pairs"] if p["accepted"]}
+        accepted = [(p["i"], p["j"]) for p in record.result["pairs"] if p["accepted"]]
         tied = _links(record.result["scans"], {edge: confidence[edge] for edge in accepted})
         rows += [
             ({**scan["grounds"], "link": tied[scan["name"]]}, scan["right"], record.unit["seed"])
@@ -109,6 +94,7 @@ def _links(
     """The links of a set's scans, by name, for these confidences of its accepted pairs."""
     names = sorted(scan["name"] for scan in scans)
     at = {name: k for k, name in enumerate(names)}
+    numbered = {(at[i], at[j]): p for (i, j), p in confidence.items() if i in at and j in at}
     tied: dict[str, float] = {}
     for number in {scan["component"] for scan in scans}:
         of = [scan for scan in scans if scan["component"] == number]
@@ -116,6 +102,5 @@ def _links(
             poses={at[scan["name"]]: Pose.identity() for scan in of},
             reference=next(at[scan["name"]] for scan in of if scan["reference"]),
         )
-        numbered = {(at[i], at[j]): p for (i, j), p in confidence.items() if i in at and j in at}
-        tied.update({names[k]: link for k, link in links(component, numbered).items()})
+        tied.update({names[k]: link for k, link in ties_of(component, numbered).items()})
     return tied

@@ -1,97 +1,108 @@
-"""What the calibration found: the package's file, docs/data/calibration.json and two diagrams."""
+"""What the calibration found: the package's file, docs/data/calibration.json, pictures, a page."""
 
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.blocks import markdown_table
 from benchmarks.calibration.fit import Examples, held_out_probabilities
 from benchmarks.calibration.learn import Learned
-from benchmarks.calibration.page import RELIABILITY, RISK
-from benchmarks.judging.measures import brier, calibration_error, reliability
-from benchmarks.judging.plots import Stated, draw_stated
-from benchmarks.paper.success import auc
-from benchmarks.results import machine
-from scanweld.geometry.arrays import FloatArray
-from scanweld.io.atomic import write_whole
+from benchmarks.judging.plots import draw, pictures
+from benchmarks.results import Json, how_measured, machine, rounded, write_file
+from benchmarks.scores import Stated
 
-NAME = "calibration"
 LEAST = (0.5, 0.8, 0.9, 0.95, 0.98)
 """Confidences from which on it is told how many of the right poses are left, and how many wrong."""
 
-Json = dict[str, Any]
+
+def write_all(learned: Learned, package: Path, out: Path, *, quick: bool = False) -> Json:
+    """Write the calibration for the package, its measures as JSON, and the pictures."""
+    found = measures(learned, quick=quick)
+    write_file(package, learned.calibration.to_json())
+    write_file(out / "data/calibration.json", json.dumps(rounded(found, 5), indent=1) + "\n")
+    stated = {"pairs": learned.stated_pairs, "placed scans": learned.stated_scans}
+    draw(stated, out, "calibration")
+    return found
 
 
-def write_all(learned: Learned, package: Path, out: Path) -> None:
-    """Write the calibration for the package, its measures as JSON, and the diagrams."""
-    package.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(package, learned.calibration.to_json().encode())
-    data = out / f"data/{NAME}.json"
-    data.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(data, (json.dumps(_rounded(measures(learned)), indent=1) + "\n").encode())
-    draw(learned, out)
-
-
-def measures(learned: Learned) -> Json:
-    """All measures; those of right and wrong are of objects that were held out."""
+def measures(learned: Learned, *, quick: bool = False) -> Json:
+    """All measures, of objects that were held out; if quick, not without each of the grounds."""
     return {
         **learned.calibration.made,
         "machine": machine(),
-        "pair": _measures(learned.pairs, learned.pair_confidence),
-        "scan": _measures(learned.scans, learned.scan_confidence),
+        "pair": _measures(learned.pairs, learned.stated_pairs, quick),
+        "scan": _measures(learned.scans, learned.stated_scans, quick),
     }
 
 
-def draw(learned: Learned, out: Path) -> None:
-    """What was said against what came true, and how many are wrong of those that are taken."""
-    stated = {
-        "pairs": _stated(learned.pairs, learned.pair_confidence),
-        "placed scans": _stated(learned.scans, learned.scan_confidence),
-    }
-    draw_stated(stated, out / RELIABILITY, out / RISK)
-
-
-def _stated(examples: Examples, confidence: FloatArray) -> Stated:
-    return list(zip(confidence.tolist(), examples.is_right.tolist(), strict=True))
-
-
-def _measures(examples: Examples, confidence: FloatArray) -> Json:
-    is_right = examples.is_right
+def _measures(examples: Examples, stated: Stated, quick: bool) -> Json:
+    less = {} if quick else {name: examples.without(name) for name in examples.names}
     return {
-        "count": len(examples),
-        "right": int(is_right.sum()),
-        **_quality(confidence, examples),
-        "brier": brier(confidence.tolist(), is_right.tolist()),
-        "bins": [asdict(b) for b in reliability(confidence.tolist(), is_right.tolist())],
-        "kept": [_kept_from(least, confidence, examples) for least in LEAST],
+        "count": len(stated),
+        "right": stated.num_right,
+        **_quality(stated),
+        "brier": stated.brier,
+        "bins": [asdict(b) for b in stated.bins()],
+        "kept": [_kept_from(least, stated) for least in LEAST],
         "without": {
-            name: _quality(held_out_probabilities(less), less)
-            for name in examples.names
-            for less in (examples.without(name),)
+            name: _quality(Stated(held_out_probabilities(some), some.is_right))
+            for name, some in less.items()
         },
     }
 
 
-def _quality(confidence: FloatArray, examples: Examples) -> Json:
-    stated, is_right = confidence.tolist(), examples.is_right.tolist()
-    return {"auc": auc(stated, is_right), "error": calibration_error(stated, is_right)}
+def _quality(stated: Stated) -> Json:
+    values = {"auc": stated.auc, "error": stated.calibration_error()}
+    return {key: value if np.isfinite(value) else None for key, value in values.items()}
 
 
-def _kept_from(least: float, confidence: FloatArray, examples: Examples) -> Json:
-    kept = confidence >= least
-    return {
-        "least": least,
-        "right": int((kept & examples.is_right).sum()),
-        "wrong": int((kept & ~examples.is_right).sum()),
-    }
+def _kept_from(least: float, stated: Stated) -> Json:
+    is_right = stated.is_right[stated.scores >= least]
+    return {"least": least, "right": int(is_right.sum()), "wrong": int((~is_right).sum())}
 
 
-def _rounded(value: Any) -> Any:
-    """Floats to a few significant digits, at any depth."""
-    if isinstance(value, float):
-        return float(f"{value:.5g}") if np.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return [_rounded(item) for item in value] if isinstance(value, list) else value
+def calibration_told(found: Json) -> str:
+    """The calibration in Markdown, for docs/trust.md."""
+    both = {"pairs": found["pair"], "scans": found["scan"]}
+    told = (
+        f"{how_measured(found)}: {found['sets']} sets of other objects than above, and none of "
+        "them in the part of the calibration that it is measured by. "
+    )
+    if "code" in found:
+        told += f"They are of code {found['code']}.\n\n"
+    else:
+        told += "Their code was not recorded: it is older than that of the runs above.\n\n"
+    rows = [
+        (name, each["count"], each["right"], *_cells(each, auc=4, error=3, brier=3))
+        for name, each in both.items()
+    ]
+    head = ("", "poses", "right", "AUC", "calibration error", "Brier score")
+    parts = [told + markdown_table(head, rows), pictures("calibration", "poses")]
+    parts += [_kept(name, each) for name, each in both.items()]
+    parts += [_grounds(name, each) for name, each in both.items()]
+    return "\n".join(parts)
+
+
+def _cells(found: Json, **digits: int) -> list[str]:
+    """Values; a few sets may have no wrong pose, and so no AUC."""
+    return [f"{found[key]:.{d}f}" if found[key] is not None else "-" for key, d in digits.items()]
+
+
+def _kept(name: str, found: Json) -> str:
+    parts = [
+        f"from {kept['least']:g} on {kept['right']} of {found['right']} right ones and "
+        f"{kept['wrong']} wrong"
+        for kept in found["kept"]
+    ]
+    return f"Of the {name} have a confidence {'; '.join(parts)}.\n"
+
+
+def _grounds(name: str, found: Json) -> str:
+    """How much worse the model is without each ground, the most important first."""
+    known = {k: less["auc"] for k, less in found["without"].items() if less["auc"] is not None}
+    lost = {ground: (found["auc"] or np.nan) - auc for ground, auc in known.items()}
+    ranked = sorted(lost, key=lambda ground: -lost[ground])
+    told = ", ".join(f"{ground} {1e4 * lost[ground]:+.0f}" for ground in ranked)
+    return f"AUC that {name} lose without a ground, in 0.0001: {told}.\n"

@@ -7,20 +7,20 @@ import trimesh
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from benchmarks.virtual.bodies import Body, joined, turns
+from benchmarks.virtual.bodies import Body, Profile, joined, toothed
 from scanweld.evaluation.primitives import lathe
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import random_rotation
 
 Rng = np.random.Generator
-NUM_TURNS, SIZE = 360, 100.0
+SIZE = 100.0
 
 
 def blob(rng: Rng) -> Body:
     """A ball with broad and narrow bumps and dents, stretched."""
-    at = _ball()
-    return Body(mesh=_radial(at, 1.0 + _bumps(at, rng, 14, 0.35), rng.uniform(0.5, 1.2, 3)))
+    ball = _ball()
+    return Body(mesh=_radial(ball, 1.0 + _bumps(ball, rng, 14, 0.35), rng.uniform(0.5, 1.2, 3)))
 
 
 def hulls(rng: Rng) -> Body:
@@ -52,8 +52,8 @@ def twisted(rng: Rng) -> Body:
 
 def displaced(rng: Rng) -> Body:
     """A superquadric with bumps."""
-    at = _ball()
-    return Body(mesh=_radial(at, _superquadric(at, rng) * (1.0 + _bumps(at, rng, 10, 0.2))))
+    ball = _ball()
+    return Body(mesh=_radial(ball, _superquadric(ball, rng) * (1.0 + _bumps(ball, rng, 10, 0.2))))
 
 
 def relief(rng: Rng) -> Body:
@@ -68,43 +68,45 @@ def relief(rng: Rng) -> Body:
     vertices = np.concatenate([np.stack([x, y, z], axis=-1).reshape(-1, 3) for z in sheets])
     k = np.arange(n * n).reshape(n, n)
     a, b, c, d = k[:-1, :-1], k[:-1, 1:], k[1:, :-1], k[1:, 1:]
-    top = [np.stack(f, axis=-1).reshape(-1, 3) + n * n for f in ((a, b, d), (a, d, c))]
-    bottom = [np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, d, b), (a, c, d))]
     rim = np.concatenate([k[0, :-1], k[:-1, -1], k[-1, :0:-1], k[:0:-1, 0]])
-    after = np.roll(rim, -1)
-    wall = [
-        np.stack([rim, after, after + n * n], 1),
-        np.stack([rim, after + n * n, rim + n * n], 1),
+    after, top = np.roll(rim, -1), n * n
+    corners = [
+        *((a + top, b + top, d + top), (a + top, d + top, c + top)),
+        *((a, d, b), (a, c, d)),
+        *((rim, after, after + top), (rim, after + top, rim + top)),
     ]
-    return Body(mesh=TriangleMesh(vertices=vertices, faces=np.concatenate(top + bottom + wall)))
+    faces = [np.stack(f, axis=-1).reshape(-1, 3) for f in corners]
+    return Body(mesh=TriangleMesh(vertices=vertices, faces=np.concatenate(faces)))
 
 
 def vessel(rng: Rng) -> Body:
     """A surface of revolution."""
     profile = _profile(rng)
     mesh = lathe(lambda turn, level: np.maximum(profile(level), 3.0) + 0.0 * turn)
-    return Body(mesh=mesh, symmetry=turns(360))
+    return Body(mesh=mesh, is_symmetric=True)
 
 
 def prism(rng: Rng) -> Body:
     """On a regular polygon, straight or tapered."""
     sides, taper = int(rng.integers(3, 8)), rng.uniform(0.0, 0.4)
-    shape = _regular(sides)
-    size = rng.uniform(25.0, 50.0)
-    mesh = lathe(lambda turn, level: size * shape(turn) * (1.0 - taper * level))
-    return Body(mesh=mesh, symmetry=turns(sides))
+    size, half = rng.uniform(25.0, 50.0), np.pi / sides
+
+    def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
+        side = np.cos(half) / np.cos(np.mod(turn, 2 * half) - half)
+        return size * side * (1.0 - taper * level)
+
+    return Body(mesh=lathe(radius), is_symmetric=True)
 
 
 def star(rng: Rng) -> Body:
     """With equal arms."""
-    arms, radius = _star(rng)
-    mesh = lathe(radius, height=rng.uniform(20.0, 80.0))
-    return Body(mesh=mesh, symmetry=turns(arms, flips=True))
+    mesh = lathe(_star(rng), height=rng.uniform(20.0, 80.0))
+    return Body(mesh=mesh, is_symmetric=True)
 
 
 def marked_star(rng: Rng) -> Body:
     """With equal arms, one of which is different in one place: a third scan may tell."""
-    (_, plain), level_at = _star(rng), rng.uniform(0.3, 0.7)
+    plain, level_at = _star(rng), rng.uniform(0.3, 0.7)
     depth, wide = rng.uniform(4.0, 12.0), rng.uniform(0.1, 0.25)
 
     def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
@@ -117,24 +119,15 @@ def marked_star(rng: Rng) -> Body:
 
 def superquadric(rng: Rng) -> Body:
     """Between a box, a ball and an octahedron: two half turns leave it as it is."""
-    at = _ball()
-    return Body(mesh=_radial(at, _superquadric(at, rng)), symmetry=turns(2, flips=True))
+    ball = _ball()
+    return Body(mesh=_radial(ball, _superquadric(ball, rng)), is_symmetric=True)
 
 
-SOLIDS: Mapping[str, Callable[[Rng], Body]] = {
-    make.__name__: make
-    for make in (
-        *(blob, hulls, twisted, displaced, relief),
-        *(vessel, prism, star, marked_star, superquadric),
-    )
+SOLIDS: Mapping[Callable[[Rng], Body], float] = {
+    **{blob: 0.17, hulls: 0.17, twisted: 0.14, displaced: 0.14, relief: 0.07},
+    **{vessel: 0.06, prism: 0.07, star: 0.06, marked_star: 0.06, superquadric: 0.06},
 }
-ODDS = (0.17, 0.17, 0.14, 0.14, 0.07, 0.06, 0.07, 0.06, 0.06, 0.06)
 """How often each is drawn."""
-
-
-def make_solid(family: str, seed: int) -> Body:
-    """One of ``SOLIDS`` by its name; others by seed."""
-    return SOLIDS[family](np.random.default_rng([seed, 7]))
 
 
 def _ball() -> TriangleMesh:
@@ -168,9 +161,9 @@ def _superquadric(ball: TriangleMesh, rng: Rng) -> FloatArray:
 def _hull(rng: Rng) -> TriangleMesh:
     points = rng.normal(size=(int(rng.integers(8, 20)), 3)) * rng.uniform(12.0, 26.0, size=3)
     hull = ConvexHull(points)
-    faces, middle = hull.simplices.astype(np.int64), points.mean(axis=0)
+    faces, centre = hull.simplices.astype(np.int64), points.mean(axis=0)
     a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = np.einsum("nk,nk->n", np.cross(b - a, c - a), a - middle) < 0
+    inward = np.einsum("nk,nk->n", np.cross(b - a, c - a), a - centre) < 0
     faces[inward] = faces[inward][:, ::-1]
     return TriangleMesh(vertices=points, faces=faces)
 
@@ -189,24 +182,12 @@ def _profile(rng: Rng) -> Callable[[FloatArray], FloatArray]:
     """A smooth radius by level, 0 to 1."""
     steps = np.linspace(0.0, 1.0, 40)
     rough = _unit(ndimage.gaussian_filter1d(rng.normal(size=40), 4.0, mode="nearest"))
-    radii = 25.0 + 8.0 * rough
-    return lambda level: np.interp(level, steps, radii)
+    return lambda level: np.interp(level, steps, 25.0 + 8.0 * rough)
 
 
-def _star(rng: Rng) -> tuple[int, Callable[[FloatArray, FloatArray], FloatArray]]:
-    """Number of arms, and radius by turn and level."""
-    arms, depth, sharp = int(rng.integers(3, 9)), rng.uniform(6.0, 16.0), rng.uniform(0.5, 4.0)
-
-    def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
-        wave = np.tanh(sharp * np.cos(arms * turn)) / np.tanh(sharp)
-        return 35.0 + depth * wave + 0.0 * level
-
-    return arms, radius
-
-
-def _regular(sides: int) -> Callable[[FloatArray], FloatArray]:
-    half = np.pi / sides
-    return lambda turn: np.cos(half) / np.cos(np.mod(turn, 2 * half) - half)
+def _star(rng: Rng) -> Profile:
+    arms, depth, sharpness = int(rng.integers(3, 9)), rng.uniform(6.0, 16.0), rng.uniform(0.5, 4.0)
+    return toothed(35.0, depth / float(np.tanh(sharpness)), arms, sharpness)
 
 
 def _unit(values: FloatArray) -> FloatArray:

@@ -1,18 +1,15 @@
 """What the runs must show, beside what they show."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from benchmarks.judging.measures import calibration_error
 from benchmarks.judging.trial import CRASH, Outcome, PairOutcome, ScanOutcome
-from benchmarks.paper.success import auc
+from benchmarks.scores import Stated, bound
 from benchmarks.sets import SETS
-from benchmarks.sets import Floors as SetFloors
-from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Group
 from scanweld.reconstruction import Verdict
 
@@ -25,7 +22,7 @@ FACTOR_SLACK = 0.004
 _NUMBER = re.compile(r"(\d+\.\d+)(\s*%)?")
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Floor:
     """What is measured, what must be reached, what is reached; None where it is not judged."""
 
@@ -37,68 +34,88 @@ class Floor:
 
 def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
     """All floors but those of the real sets."""
-    scans = scans_of(outcomes)
+    scans, pairs = scans_of(outcomes), stated_pairs(outcomes)
     good = [scan for scan in scans if scan.is_good]
-    false = sum(scan.is_false for scan in good)
-    strangers = [scan for scan in scans if scan.world is None]
-    good_strangers = sum(scan.is_good for scan in strangers)
+    strangers = [scan for scan in scans if scan.is_stranger]
+    scaled = [scan for scan in scans if scan.factor != 1.0]
+    not_good, named = sum(not s.is_good for s in scaled), sum(map(names_factor, scaled))
+    error, crashes = pairs.calibration_error(), sum(o.verdict == CRASH for o in outcomes)
     return [
-        Floor(
-            measure="scans called good that are wrong, or whose pose nothing determines",
-            asked="0",
-            reached=f"{false} of {len(good)} good scans, {len(scans)} in all",
-            is_met=false == 0,
+        _none(
+            "scans called good that are wrong, or whose pose nothing determines",
+            {f"of {len(good)} good scans, {len(scans)} in all": sum(s.is_false for s in good)},
+            outcomes,
         ),
         _asserted(outcomes),
-        Floor(
-            measure="scans of another object, of noise, mirrored: called good",
-            asked="0",
-            reached=f"{good_strangers} of {len(strangers)}",
-            is_met=good_strangers == 0,
+        _none(
+            "scans of another object, of noise, mirrored: called good",
+            {f"of {len(strangers)}": sum(scan.is_good for scan in strangers)},
+            [outcome for outcome in outcomes if any(s.is_stranger for s in outcome.scans)],
         ),
         _clean(outcomes),
         _worst(outcomes, Group.HARD, MIN_HARD, "each hard condition alone"),
         _worst(outcomes, Group.CROP, MIN_CROP, "each crop alone"),
-        _scale(outcomes),
-        *_confidence(outcomes),
-        _ended(outcomes),
+        Floor(
+            "a scan whose scale is wrong by 1 %: doubtful or refused, with the factor",
+            "all",
+            f"{not_good} of {len(scaled)}, with the factor {named}",
+            not_good == named == len(scaled) if scaled else None,
+        ),
+        Floor(
+            "confidence of pairs, right against wrong: AUC",
+            f">= {MIN_AUC:g}",
+            f"{pairs.auc:.4f} of {len(pairs)} pairs, {pairs.num_right} right",
+            pairs.auc >= MIN_AUC if len(pairs) else None,
+        ),
+        Floor(
+            "the same: expected calibration error",
+            f"<= {MAX_CALIBRATION_ERROR:g}",
+            f"{error:.4f}",
+            error <= MAX_CALIBRATION_ERROR if len(pairs) else None,
+        ),
+        _none("runs that crash", {f"of {len(outcomes)}": crashes}, outcomes),
     ]
 
 
 def real_sets(runs: Sequence[Mapping[str, Any]]) -> Floor:
-    """The records of ``benchmarks/run.py``, against the floors of its sets."""
-    met = [_is_met(run, SETS[run["set"]].floors) for run in runs]
+    """The records of ``benchmarks.run``, against the floors of its sets."""
+    met = sum(SETS[run["set"]].is_met(run) for run in runs)
     good = sum(run["verdict"] == Verdict.GOOD for run in runs)
     return Floor(
-        measure="the real sets: at their floors, verdict good",
-        asked="all",
-        reached=f"{sum(met)} of {len(runs)} at their floors, {good} good",
-        is_met=all(met) and good == len(runs),
+        "the real sets: at their floors, verdict good",
+        "all",
+        f"{met} of {len(runs)} at their floors, {good} good",
+        met == good == len(runs),
     )
 
 
-def _is_met(run: Mapping[str, Any], asked: SetFloors) -> bool:
-    limits = {k: v for k, v in asdict(asked).items() if k != "right" and v is not None}
-    return (
-        run["right"] >= asked.right
-        and run["wrong"] == 0
-        and all(run[key] is not None and run[key] <= limit for key, limit in limits.items())
-    )
-
-
-def scans_of(outcomes: Sequence[Outcome]) -> list[ScanOutcome]:
+def scans_of(outcomes: Iterable[Outcome]) -> list[ScanOutcome]:
     """All scans of all runs."""
     return [scan for outcome in outcomes for scan in outcome.scans]
 
 
-def posed_pairs(outcomes: Sequence[Outcome]) -> list[PairOutcome]:
+def posed_pairs(outcomes: Iterable[Outcome]) -> list[PairOutcome]:
     """All pairs of all runs that have a pose."""
     return [pair for outcome in outcomes for pair in outcome.pairs if pair is not None]
 
 
-def determined(outcomes: Sequence[Outcome]) -> list[ScanOutcome]:
+def determined(outcomes: Iterable[Outcome]) -> list[ScanOutcome]:
     """The scans that belong and whose pose is determined by what they show."""
-    return [scan for scan in scans_of(outcomes) if scan.world is not None and not scan.is_open]
+    return [scan for scan in scans_of(outcomes) if scan.is_determined]
+
+
+def stated_pairs(outcomes: Iterable[Outcome]) -> Stated:
+    """Confidences of all pairs that have a pose."""
+    return Stated.of((pair.confidence, pair.is_right) for pair in posed_pairs(outcomes))
+
+
+def stated_scans(outcomes: Iterable[Outcome]) -> Stated:
+    """Confidences of all placed scans: whether they are right beside others of their component."""
+    return Stated.of(
+        (scan.confidence, scan.is_placed and not scan.is_false)
+        for scan in scans_of(outcomes)
+        if scan.confidence is not None and scan.is_placed
+    )
 
 
 def share(scans: Sequence[ScanOutcome], holds: Callable[[ScanOutcome], bool]) -> float:
@@ -114,96 +131,50 @@ def names_factor(scan: ScanOutcome) -> bool:
     return "scale" in scan.reason and any(abs(f - t) < FACTOR_SLACK for f in factors for t in true)
 
 
-def _ended(outcomes: Sequence[Outcome]) -> Floor:
-    crashes = sum(outcome.verdict == CRASH for outcome in outcomes)
-    return Floor(
-        measure="runs that crash",
-        asked="0",
-        reached=f"{crashes} of {len(outcomes)}",
-        is_met=crashes == 0,
-    )
+def _none(measure: str, counts: Mapping[str, int], runs: Sequence[Outcome]) -> Floor:
+    """Something that must not happen in any of these runs; beside a zero stands its bound."""
+    told = ", ".join(f"{count} {of}" for of, count in counts.items())
+    is_met = not any(counts.values())
+    told += f" ({bound(len(runs))})" if is_met and runs else ""
+    return Floor(measure, "0", told, is_met)
 
 
 def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     """Poses that are asserted although several explain what the scans show."""
-    open_scans = [s for s in scans_of(outcomes) if s.is_open]
-    open_pairs = [p for p in posed_pairs(outcomes) if p.is_open]
-    asserted = [
-        sum((each.confidence or 0.0) > ASSERTED for each in some)
-        for some in (open_scans, open_pairs)
-    ]
-    return Floor(
-        measure="symmetric and sliding objects: pose asserted with confidence > 0.5",
-        asked="0",
-        reached=f"{asserted[0]} of {len(open_scans)} scans, "
-        f"{asserted[1]} of {len(open_pairs)} pairs",
-        is_met=sum(asserted) == 0 if open_scans else None,
-    )
+    scans = [scan for scan in scans_of(outcomes) if scan.is_open]
+    pairs = [pair for pair in posed_pairs(outcomes) if pair.is_open]
+    counts = {
+        f"of {len(some)} {name}": sum((each.confidence or 0.0) > ASSERTED for each in some)
+        for name, some in (("scans", scans), ("pairs", pairs))
+    }
+    measure = f"symmetric and sliding objects: pose asserted with confidence > {ASSERTED:g}"
+    runs = [outcome for outcome in outcomes if any(s.is_open for s in outcome.scans)]
+    found = _none(measure, counts, runs)
+    return found if scans else Floor(measure, "0", found.reached, None)
 
 
 def _clean(outcomes: Sequence[Outcome]) -> Floor:
-    scans = determined([o for o in outcomes if group_of(o) is Group.CLEAN])
+    scans = determined(o for o in outcomes if o.group is Group.CLEAN)
     reached = share(scans, lambda scan: scan.is_good and scan.is_right)
     return Floor(
-        measure="clean scenarios: scans called good and right",
-        asked=f">= {100 * MIN_CLEAN:g} %",
-        reached=f"{100 * reached:.1f} % of {len(scans)}",
-        is_met=reached >= MIN_CLEAN if scans else None,
+        "clean scenarios: scans called good and right",
+        f">= {100 * MIN_CLEAN:g} %",
+        f"{100 * reached:.1f} % of {len(scans)}",
+        reached >= MIN_CLEAN if scans else None,
     )
 
 
 def _worst(outcomes: Sequence[Outcome], group: Group, floor: float, told: str) -> Floor:
     """The scenario of a group with the fewest right scans of those that belong."""
     shares = {
-        name: share(determined([o for o in outcomes if o.scenario == name]), lambda s: s.is_right)
-        for name in dict.fromkeys(o.scenario for o in outcomes if group_of(o) is group)
+        name: share(determined(o for o in outcomes if o.scenario == name), lambda s: s.is_right)
+        for name in dict.fromkeys(o.scenario for o in outcomes if o.group is group)
     }
     missed = [name for name in shares if not shares[name] >= floor]
     worst = min(shares, key=lambda name: shares[name], default="none")
     reached = f"least: {worst}, {100 * shares[worst]:.0f} %" if shares else "not measured"
     if missed:
         reached += f"; {len(missed)} of {len(shares)} below"
-    return Floor(
-        measure=f"{told}: right, of the scans that belong",
-        asked=f">= {100 * floor:g} %",
-        reached=reached,
-        is_met=not missed if shares else None,
-    )
-
-
-def _scale(outcomes: Sequence[Outcome]) -> Floor:
-    scaled = [scan for scan in scans_of(outcomes) if scan.factor != 1.0]
-    good = sum(scan.is_good for scan in scaled)
-    named = sum(names_factor(scan) for scan in scaled)
-    return Floor(
-        measure="a scan whose scale is wrong by 1 %: doubtful or refused, with the factor",
-        asked="all",
-        reached=f"{len(scaled) - good} of {len(scaled)}, with the factor {named}",
-        is_met=not good and named == len(scaled) if scaled else None,
-    )
-
-
-def _confidence(outcomes: Sequence[Outcome]) -> list[Floor]:
-    pairs = posed_pairs(outcomes)
-    confidences, is_right = [p.confidence for p in pairs], [p.is_right for p in pairs]
-    area = auc(confidences, is_right)
-    error = calibration_error(confidences, is_right)
-    return [
-        Floor(
-            measure="confidence of pairs, right against wrong: AUC",
-            asked=f">= {MIN_AUC:g}",
-            reached=f"{area:.4f} of {len(pairs)} pairs, {sum(is_right)} right",
-            is_met=area >= MIN_AUC if pairs else None,
-        ),
-        Floor(
-            measure="the same: expected calibration error",
-            asked=f"<= {MAX_CALIBRATION_ERROR:g}",
-            reached=f"{error:.4f}",
-            is_met=error <= MAX_CALIBRATION_ERROR if pairs else None,
-        ),
-    ]
-
-
-def group_of(outcome: Outcome) -> Group:
-    """What is asked of a run's scenario."""
-    return SCENARIOS[outcome.scenario].group
+    asked = f">= {100 * floor:g} %"
+    is_met = not missed if shares else None
+    return Floor(f"{told}: right, of the scans that belong", asked, reached, is_met)

@@ -6,6 +6,7 @@ from statistics import mean, mode
 from typing import Any, Literal
 
 import numpy as np
+from scanweld.pairs.alternatives import schedules
 
 from benchmarks.paper.method_page import Results
 from benchmarks.paper.method_reasons import REASONS
@@ -16,7 +17,6 @@ from benchmarks.paper.success import Limit, auc
 from benchmarks.paper.table2 import SWEEP_DEG
 from scanweld.config import Config
 from scanweld.evidence.evidence import Evidence
-from scanweld.pairs.alternatives import schedules
 
 Answer = dict[str, Any]
 """A record of benchmarks/pairs.py."""

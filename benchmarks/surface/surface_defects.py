@@ -17,19 +17,13 @@ _SLIT_VOXELS = 0.5
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SurfaceDefects:
-    """Counts of defects.
+    """Counts of defects."""
 
-    Attributes:
-        non_manifold: Edges with more than two faces.
-        double: Vertices that have a second sheet, which looks the same way, close before or behind.
-        cracks: Borders around a pinhole, or a slit narrower than a voxel.
-        borders: Those around a hole, or the end of what was seen.
-    """
-
-    non_manifold: int
+    non_manifold: int  # Edges with more than two faces
+    # Vertices that have a second sheet, which looks the same way, close before or behind
     double: int
-    cracks: int
-    borders: int
+    cracks: int  # Borders around a pinhole, or a slit narrower than a voxel
+    borders: int  # Those around a hole, or the end of what was seen
 
 
 def surface_defects(mesh: TriangleMesh, voxel: float) -> SurfaceDefects:

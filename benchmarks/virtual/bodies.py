@@ -8,40 +8,31 @@ import numpy as np
 import trimesh
 
 from benchmarks.virtual.brackets import bracket
-from benchmarks.virtual.profiles import gear_radius, keyed, knobbed, vase_radius
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.primitives import box, cylinder, lathe, plate, sphere
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.geometry.pose import Pose, rotation_exp
 
-CREATURE_VOXELS = 120
 FIRST_CREATURE = 1000
 """Seeds of these creatures start here: nothing else of the project uses them."""
-STRETCH = 0.2
-"""Creatures are stretched or squashed by up to this share along each axis."""
-MIRROR_Y = 2.0
-"""Plane at which a figure is mirrored: beside its trunk's middle."""
-TURN_STEP_DEG = 1.0
-"""Step at which the turns of a surface of revolution are sampled."""
+TOOTH_HEIGHT = 6.0
+"""Half of a gear tooth's, in hundredths of twice the gear's radius."""
 
 Rng = np.random.Generator
+Profile = Callable[[FloatArray, FloatArray], FloatArray]
+"""Radius by turn (radians) and level (0 at the bottom, 1 at the top)."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Body:
-    """An object, standing along z.
+    """An object, standing along z."""
 
-    Attributes:
-        mesh: Faces counter-clockwise seen from outside.
-        symmetry: Motions, besides none, that leave the object as it is. Where there are any, the
-            pose of a scan is not determined by what it shows.
-        unmarked: The same object without the mark that alone tells it from a symmetric one; None
-            where there is no such mark.
-    """
-
-    mesh: TriangleMesh
-    symmetry: tuple[Pose, ...] = ()
+    mesh: TriangleMesh  # Faces counter-clockwise seen from outside
+    # Whether a motion leaves the object as it is: then the pose of a scan is not determined by what
+    # it shows
+    is_symmetric: bool = False
+    # The same object without the mark that alone tells it from a symmetric one; None where there is
+    # no such mark
     unmarked: TriangleMesh | None = None
 
 
@@ -51,35 +42,20 @@ def make_body(name: str, seed: int) -> Body:
     return BODIES[name](seed)
 
 
-def thing(seed: int) -> Body:
-    """An object without symmetry: a figure or a made part by turns."""
-    return part(seed) if seed % 2 else figure(seed)
-
-
-def other_thing(seed: int) -> Body:
-    """An object of the other sort than ``thing`` of the same seed."""
-    return figure(seed) if seed % 2 else part(seed)
-
-
 def figure(seed: int) -> Body:
     """A four-legged figure with much self-occlusion, of any proportions."""
-    mesh = creature(FIRST_CREATURE + seed, voxels=CREATURE_VOXELS)
-    factors = 1.0 + np.random.default_rng([seed, 5]).uniform(-STRETCH, STRETCH, size=3)
+    mesh = creature(FIRST_CREATURE + seed, voxels=120)
+    factors = 1.0 + np.random.default_rng([seed, 5]).uniform(-0.2, 0.2, size=3)
     return Body(mesh=TriangleMesh(vertices=mesh.vertices * factors, faces=mesh.faces))
-
-
-def part(seed: int) -> Body:
-    """A made part: flat faces, tubes, rings, bores."""
-    return Body(mesh=bracket(seed))
 
 
 def mirrored_figure(seed: int) -> Body:
     """A figure whose right side is the mirror image of its left: no motion maps it on itself."""
-    mesh = figure(seed).mesh
+    mesh, plane_y = figure(seed).mesh, 2.0
     vertices, faces, _ = trimesh.intersections.slice_faces_plane(
-        mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]), np.array([0.0, MIRROR_Y, 0.0])
+        mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]), np.array([0.0, plane_y, 0.0])
     )
-    other = vertices * [1.0, -1.0, 1.0] + [0.0, 2 * MIRROR_Y, 0.0]
+    other = vertices * [1.0, -1.0, 1.0] + [0.0, 2 * plane_y, 0.0]
     left = TriangleMesh(vertices=vertices, faces=faces)
     return Body(mesh=joined(left, TriangleMesh(vertices=other, faces=faces[:, ::-1])))
 
@@ -92,81 +68,99 @@ def joined(one: TriangleMesh, other: TriangleMesh) -> TriangleMesh:
     )
 
 
-def turns(count: int, *, flips: bool = False) -> tuple[Pose, ...]:
-    """All turns about z by 360 / count degrees; with flips, the half turns about x besides."""
-    about_z = [rotation_exp(np.array([0.0, 0.0, 2 * np.pi * k / count])) for k in range(count)]
-    flip = rotation_exp(np.array([np.pi, 0.0, 0.0]))
-    rotations = about_z + [turn @ flip for turn in about_z] * flips
-    return tuple(Pose(rotation=rotation, translation=np.zeros(3)) for rotation in rotations)[1:]
+def shifted(mesh: TriangleMesh, shift: FloatArray) -> TriangleMesh:
+    """A mesh moved by a vector (3,)."""
+    return TriangleMesh(vertices=mesh.vertices + shift, faces=mesh.faces)
 
 
-def any_turn(count: int = 2000) -> tuple[Pose, ...]:
-    """Turns spread over SO(3)."""
-    rng = np.random.default_rng(0)
-    axes = rng.normal(size=(count, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    angles = rng.uniform(0, np.pi, size=(count, 1))
-    return tuple(Pose(rotation=rotation_exp(w), translation=np.zeros(3)) for w in axes * angles)
+def middle(mesh: TriangleMesh) -> FloatArray:
+    """Centre (3,) of the box around a mesh."""
+    return 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
 
 
-def _solid(
-    make: Callable[[Rng], TriangleMesh], symmetry: tuple[Pose, ...]
-) -> Callable[[int], Body]:
-    """A solid whose proportions differ by seed, moved so that its middle is the origin."""
+def vase(rng: Rng) -> Profile:
+    """A belly, a neck and a lip, wider or slimmer."""
+    width, waves = rng.uniform(19.0, 25.0), rng.uniform(2.4, 2.8)
+    return lambda turn, level: (
+        width + 12.0 * np.sin(waves * np.pi * level + 0.3) - 4.0 * level + 0.0 * turn
+    )
+
+
+def knobbed_vase(rng: Rng) -> Profile:
+    """The same with one knob on the belly, 7 wide and 4 high where the vase's height is 100."""
+    plain = vase(rng)
+    belly = float(plain(np.zeros(1), np.full(1, 0.3))[0])
+
+    def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
+        around = belly * np.angle(np.exp(1j * (turn - 1.0)))
+        away2 = around**2 + (100.0 * (level - 0.3)) ** 2
+        return plain(turn, level) + 4.0 * np.exp(-away2 / (2 * (7.0 / 2.4) ** 2))
+
+    return radius
+
+
+def toothed(size: float, height: float, count: int, sharpness: float) -> Profile:
+    """A disc with teeth, or a star with arms."""
+    return lambda turn, level: (
+        size + height * np.tanh(sharpness * np.cos(count * turn)) + 0.0 * level
+    )
+
+
+def gear(rng: Rng) -> Profile:
+    """Twelve teeth."""
+    return toothed(rng.uniform(38.0, 50.0), TOOTH_HEIGHT, 12, 4.0)
+
+
+def worn_gear(rng: Rng) -> Profile:
+    """The same with one tooth that is worn to half its height over its upper half."""
+    plain = gear(rng)
+
+    def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
+        worn = np.abs(np.angle(np.exp(1j * turn))) < np.pi / 14
+        return plain(turn, level) - np.where(worn & (level > 0.5), TOOTH_HEIGHT, 0.0)
+
+    return radius
+
+
+def _solid(make: Callable[[Rng], TriangleMesh]) -> Callable[[int], Body]:
+    """A symmetric solid about its middle whose proportions differ by seed."""
 
     def body(seed: int) -> Body:
         mesh = make(np.random.default_rng([seed, 6]))
-        return Body(mesh=_shifted(mesh, _middle(mesh)), symmetry=symmetry)
+        return Body(mesh=shifted(mesh, -middle(mesh)), is_symmetric=True)
 
     return body
 
 
 def _marked(
-    marked: Callable[[Rng], TriangleMesh], unmarked: Callable[[Rng], TriangleMesh]
+    plain: Callable[[Rng], Profile], marked: Callable[[Rng], Profile], height: float
 ) -> Callable[[int], Body]:
-    """A solid with a mark, and the same without it."""
+    """A solid of revolution with a mark, and the same without it."""
 
     def body(seed: int) -> Body:
-        meshes = [make(np.random.default_rng([seed, 6])) for make in (marked, unmarked)]
-        middle = _middle(meshes[1])
-        with_mark, without = (_shifted(mesh, middle) for mesh in meshes)
-        return Body(mesh=with_mark, unmarked=without)
+        without, mesh = (
+            lathe(profile(np.random.default_rng([seed, 6])), height) for profile in (plain, marked)
+        )
+        centre = middle(without)
+        return Body(mesh=shifted(mesh, -centre), unmarked=shifted(without, -centre))
 
     return body
 
 
-def _middle(mesh: TriangleMesh) -> FloatArray:
-    return 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-
-
-def _shifted(mesh: TriangleMesh, middle: FloatArray) -> TriangleMesh:
-    return TriangleMesh(vertices=mesh.vertices - middle, faces=mesh.faces)
-
-
-def _vase(rng: Rng) -> TriangleMesh:
-    return lathe(vase_radius(rng))
-
-
-def _gear(rng: Rng) -> TriangleMesh:
-    return lathe(gear_radius(rng), 25.0)
-
-
-_ROUND = round(360 / TURN_STEP_DEG)
-
 BODIES: dict[str, Callable[[int], Body]] = {
-    "thing": thing,
-    "other thing": other_thing,
+    # Without symmetry: figures and made parts by turns, and the other sort of the two.
+    "thing": lambda seed: Body(mesh=bracket(seed)) if seed % 2 else figure(seed),
+    "other thing": lambda seed: figure(seed) if seed % 2 else Body(mesh=bracket(seed)),
     "mirror figure": mirrored_figure,
-    "sphere": _solid(lambda rng: sphere(), any_turn()),
-    "cylinder": _solid(lambda rng: cylinder(rng.uniform(22, 40)), turns(_ROUND, flips=True)),
+    "sphere": _solid(lambda rng: sphere()),
+    "cylinder": _solid(lambda rng: cylinder(rng.uniform(22, 40))),
     "cone": _solid(
-        lambda rng: lathe(lambda turn, level: 40.0 - 39.9 * level, rng.uniform(70, 130)),
-        turns(_ROUND),
+        lambda rng: lathe(lambda turn, level: 40.0 - 39.9 * level, rng.uniform(70, 130))
     ),
-    "box": _solid(lambda rng: box(*rng.uniform([50, 72, 95], [65, 88, 115])), turns(2, flips=True)),
-    "plate": _solid(lambda rng: plate(100.0, rng.uniform(60, 85)), turns(2, flips=True)),
-    "vase": _solid(_vase, turns(_ROUND)),
-    "gear": _solid(_gear, turns(12, flips=True)),
-    "marked vase": _marked(lambda rng: lathe(knobbed(vase_radius(rng))), _vase),
-    "marked gear": _marked(lambda rng: lathe(keyed(gear_radius(rng)), 25.0), _gear),
+    "box": _solid(lambda rng: box(*rng.uniform([50, 72, 95], [65, 88, 115]))),
+    "plate": _solid(lambda rng: plate(100.0, rng.uniform(60, 85))),
+    "vase": _solid(lambda rng: lathe(vase(rng))),
+    "gear": _solid(lambda rng: lathe(gear(rng), 25.0)),
+    "marked vase": _marked(vase, knobbed_vase, 100.0),
+    "marked gear": _marked(gear, worn_gear, 25.0),
 }

@@ -1,7 +1,5 @@
 """Made parts: plates, blocks, tubes and rings grown together at random, drilled and engraved."""
 
-from collections.abc import Callable
-
 import numpy as np
 from skimage.measure import marching_cubes
 
@@ -12,12 +10,8 @@ from scanweld.geometry.pose import random_rotation, rotation_exp
 HALF_LENGTH = 50.0
 """Of the plate that everything stands on; the whole is about 150 units across."""
 FILLET = 3.0
-NUM_PARTS = 7
-NUM_BORES = 3
+NUM_PARTS, NUM_BORES = 7, 3
 GROOVE_WIDTH, GROOVE_DEPTH = 2.5, 2.0
-
-Distance = Callable[[FloatArray], FloatArray]
-"""Distance (...) of points (..., 3) in a part's own frame from its surface, negative inside."""
 Rng = np.random.Generator
 
 
@@ -34,11 +28,13 @@ def bracket(seed: int, *, voxels: int = 110) -> TriangleMesh:
     step = 2 * reach / voxels
     axis = np.arange(-reach, reach + step, step)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
-    field = _block(half, 3.0)(points)
+    field = _block(points, half, 3.0)
     for k in range(NUM_PARTS):
-        field = _smooth_min(field, _part(k, half, rng)(points), FILLET)
+        part = _part(points, k, half, rng)
+        near = np.maximum(FILLET - np.abs(field - part), 0.0)
+        field = np.minimum(field, part) - 0.25 * near**2 / FILLET
     for _ in range(NUM_BORES):
-        field = np.maximum(field, -_bore(half, rng)(points))
+        field = np.maximum(field, -_bore(points, half, rng))
     field += GROOVE_DEPTH * _groove(points, rng)
     # A node exactly on the surface would give faces without area.
     field[np.abs(field) < 1e-3 * step] = 1e-3 * step
@@ -51,28 +47,29 @@ def bracket(seed: int, *, voxels: int = 110) -> TriangleMesh:
     return TriangleMesh(vertices=vertices, faces=faces)
 
 
-def _part(number: int, half: FloatArray, rng: Rng) -> Distance:
+def _part(points: FloatArray, number: int, half: FloatArray, rng: Rng) -> FloatArray:
     """A block, a tube or a ring by turns, standing on either side of the plate, tilted."""
     side = 1.0 if number % 3 else -1.0
     middle = np.array([*rng.uniform(-0.85, 0.85, size=2) * half[:2], 0.0])
     size = HALF_LENGTH * rng.uniform(0.16, 0.4)
     tilt = rotation_exp(rng.normal(scale=0.35, size=3))
     if number % 3 == 0:
-        own, middle[2] = _block(size * rng.uniform(0.4, 1.1, size=3), 2.0), side * size * 0.7
-    elif number % 3 == 1:
+        edges = size * rng.uniform(0.4, 1.1, size=3)
+        middle[2] = side * size * 0.7
+        return _block((points - middle) @ tilt, edges, 2.0)
+    if number % 3 == 1:
         height = HALF_LENGTH * rng.uniform(0.3, 0.75)
-        own, middle[2] = _tube(0.6 * size, height), side * 0.6 * height
-    else:
-        own, middle[2] = _ring(size, size * rng.uniform(0.22, 0.4)), side * size
-        tilt = random_rotation(rng)
-    return _placed(own, tilt, middle)
+        middle[2] = side * 0.6 * height
+        return _tube((points - middle) @ tilt, 0.6 * size, height)
+    thickness, middle[2] = size * rng.uniform(0.22, 0.4), side * size
+    return _ring((points - middle) @ random_rotation(rng), size, thickness)
 
 
-def _bore(half: FloatArray, rng: Rng) -> Distance:
+def _bore(points: FloatArray, half: FloatArray, rng: Rng) -> FloatArray:
     """A hole through the plate and what stands over it."""
     middle = np.array([*rng.uniform(-0.8, 0.8, size=2) * half[:2], 0.0])
     tilt = rotation_exp(rng.normal(scale=0.15, size=3))
-    return _placed(_tube(HALF_LENGTH * rng.uniform(0.06, 0.12), 3 * HALF_LENGTH), tilt, middle)
+    return _tube((points - middle) @ tilt, HALF_LENGTH * rng.uniform(0.06, 0.12), 3 * HALF_LENGTH)
 
 
 def _groove(points: FloatArray, rng: Rng) -> FloatArray:
@@ -84,36 +81,18 @@ def _groove(points: FloatArray, rng: Rng) -> FloatArray:
     return here * np.exp(-((line * HALF_LENGTH / (a * GROOVE_WIDTH)) ** 2))
 
 
-def _placed(own: Distance, rotation: FloatArray, middle: FloatArray) -> Distance:
-    return lambda points: own((points - middle) @ rotation)
+# Distances (...) of points (..., 3) in a part's own frame from its surface, negative inside.
+def _block(points: FloatArray, half: FloatArray, rounding: float) -> FloatArray:
+    beyond = np.abs(points) - (half - rounding)
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+    return outside + np.minimum(beyond.max(axis=-1), 0.0) - rounding
 
 
-def _block(half: FloatArray, rounding: float) -> Distance:
-    def distance(points: FloatArray) -> FloatArray:
-        beyond = np.abs(points) - (half - rounding)
-        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
-        return outside + np.minimum(beyond.max(axis=-1), 0.0) - rounding
-
-    return distance
+def _tube(points: FloatArray, radius: float, half_height: float) -> FloatArray:
+    across = np.hypot(points[..., 0], points[..., 1]) - radius
+    return np.maximum(across, np.abs(points[..., 2]) - half_height)
 
 
-def _tube(radius: float, half_height: float) -> Distance:
-    def distance(points: FloatArray) -> FloatArray:
-        across = np.hypot(points[..., 0], points[..., 1]) - radius
-        return np.maximum(across, np.abs(points[..., 2]) - half_height)
-
-    return distance
-
-
-def _ring(radius: float, thickness: float) -> Distance:
-    def distance(points: FloatArray) -> FloatArray:
-        across = np.hypot(points[..., 0], points[..., 1]) - radius
-        return np.hypot(across, points[..., 2]) - thickness
-
-    return distance
-
-
-def _smooth_min(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
-    """The minimum, rounded where a and b differ by less than a width."""
-    near = np.maximum(width - np.abs(a - b), 0.0)
-    return np.minimum(a, b) - 0.25 * near**2 / width
+def _ring(points: FloatArray, radius: float, thickness: float) -> FloatArray:
+    across = np.hypot(points[..., 0], points[..., 1]) - radius
+    return np.hypot(across, points[..., 2]) - thickness

@@ -7,9 +7,8 @@ from enum import StrEnum
 import numpy as np
 
 from benchmarks.virtual.bodies import Body, make_body
-from benchmarks.virtual.disturbances import Disturbance
+from benchmarks.virtual.disturbances import Disturbance, Strangers
 from benchmarks.virtual.shots import SLIGHT, Shot, Taking, Views, is_chain, take_shots
-from benchmarks.virtual.strangers import Strangers
 from scanweld.evaluation.metrics import object_diameter, scan_centroids
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import View
@@ -21,9 +20,8 @@ from scanweld.geometry.scan import RangeScan, principal_diameter
 CHAIN_OVERLAP = 0.2
 """Pairs of neighbours overlap by at least this share."""
 MAX_DRAWS = 60
-MARK_PIXELS = 25
+MARK_PIXELS, HIDDEN_PIXELS = 25, 3
 """A scan that shows a mark shows so many pixels of it, another one next to none."""
-HIDDEN_PIXELS = 3
 MIN_MARKED = 2
 """Scans that show it."""
 
@@ -41,63 +39,38 @@ class Group(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Scenario:
-    """How to make the scans of a run.
+    """How to make the scans of a run."""
 
-    Attributes:
-        group: What is asked of it.
-        seeds: How many runs.
-        body: Name of the object.
-        views: Where it is scanned from.
-        taking: What else is in front of the sensor.
-        noise: What the sensor does to depth.
-        crop: What is cut off the scans.
-        disturbances: What happens to the scans after that, one after the other.
-        strangers: Scans that are added.
-        min_overlap: Of the pairs that connect all scans of the object; views are drawn anew until
-            this holds.
-        spoils_first: Whether the first scan is not to be placed, so that the others have to be
-            connected without it.
-    """
-
-    group: Group
-    seeds: int
-    body: str = "thing"
-    views: Views
-    taking: Taking = take_shots
-    noise: NoiseModel = SLIGHT
-    crop: Disturbance | None = None
+    group: Group  # What is asked of it
+    seeds: int  # How many runs
+    body: str = "thing"  # Name of the object
+    views: Views  # Where it is scanned from
+    taking: Taking = take_shots  # What else is in front of the sensor
+    noise: NoiseModel = SLIGHT  # What the sensor does to depth
+    crop: Disturbance | None = None  # What is cut off the scans
+    # What happens to the scans after that, one after the other
     disturbances: tuple[Disturbance, ...] = ()
-    strangers: Strangers | None = None
+    strangers: Strangers | None = None  # Scans that are added
+    # Of the pairs that connect all scans of the object; views are drawn anew until this holds
     min_overlap: float = CHAIN_OVERLAP
+    # Whether the first scan is not to be placed, so that the others have to be connected without it
     spoils_first: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Scene:
-    """What the main job is given, and what it should find.
+    """What the main job is given, and what it should find."""
 
-    Attributes:
-        scans: In random frames, under neutral names.
-        truth: world_from_scan of all that belong somewhere.
-        worlds: Number of each scan's world; a second object has one of its own.
-        sources: What each scan was made from, in words.
-        factors: Scale of the scans whose scale is wrong.
-        is_open: Scans whose pose nothing that they show determines: those of symmetric objects,
-            and those that do not see the one mark.
-        symmetry: Motions of the world that leave the object as it is.
-        diameter: Of the object, or of what a crop left of it.
-        centroids: Of each scan, in its frame.
-    """
-
-    scans: list[RangeScan]
-    truth: dict[str, Pose]
-    worlds: dict[str, int]
-    sources: dict[str, str]
-    factors: dict[str, float]
+    scans: list[RangeScan]  # In random frames, under neutral names
+    truth: dict[str, Pose]  # world_from_scan of all that belong somewhere
+    worlds: dict[str, int]  # Number of each scan's world; a second object has one of its own
+    sources: dict[str, str]  # What each scan was made from, in words
+    factors: dict[str, float]  # Scale of the scans whose scale is wrong
+    # Scans whose pose nothing that they show determines: those of symmetric objects, and those that
+    # do not see the one mark
     is_open: frozenset[str]
-    symmetry: tuple[Pose, ...]
-    diameter: float
-    centroids: dict[str, FloatArray]
+    diameter: float  # Of the object, or of what a crop left of it
+    centroids: dict[str, FloatArray]  # Of each scan, in its frame
 
 
 def make_scene(scenario: Scenario, seed: int) -> Scene:
@@ -115,16 +88,14 @@ def make_scene(scenario: Scenario, seed: int) -> Scene:
     else:
         raise ValueError(f"no views of the {scenario.body} overlap enough, seed {seed}")
     shots = scenario.taking(body, views, scenario.noise, seed)
-    if body.unmarked is not None:
-        seen = mark_pixels(body, views)
-        shots = [replace(s, sees_mark=n >= MARK_PIXELS) for s, n in zip(shots, seen, strict=True)]
-    shots = _cropped(scenario, shots, seed, draw)
+    shots = _cropped(scenario, with_mark_seen(shots, body, views, MARK_PIXELS), seed, draw)
     rng = np.random.default_rng([seed, 1])
     for disturb in scenario.disturbances:
         shots = disturb(shots, rng)
     if scenario.strangers:
         shots = shots + scenario.strangers(seed, rng)
-    return posed(shots, body, _diameter(body, bare), seed)
+    left = object_diameter([s.scan for s in bare], {s.scan.name: s.pose for s in bare})
+    return posed(shots, body, min(left, principal_diameter(body.mesh.vertices)), seed)
 
 
 def mark_pixels(body: Body, views: Sequence[View]) -> list[int]:
@@ -143,6 +114,16 @@ def mark_pixels(body: Body, views: Sequence[View]) -> list[int]:
     return counts
 
 
+def with_mark_seen(
+    shots: list[Shot], body: Body, views: Sequence[View], min_pixels: int
+) -> list[Shot]:
+    """The shots, each knowing whether it shows the mark, if there is one."""
+    if body.unmarked is None:
+        return shots
+    seen = [count >= min_pixels for count in mark_pixels(body, views)]
+    return [replace(shot, sees_mark=sees) for shot, sees in zip(shots, seen, strict=True)]
+
+
 def _shows(body: Body, views: Sequence[View]) -> bool:
     """Whether the mark is there to see, where there is one, and no view sees half of it."""
     if body.unmarked is None:
@@ -158,13 +139,6 @@ def _cropped(scenario: Scenario, shots: list[Shot], seed: int, draw: int) -> lis
     return scenario.crop(shots, np.random.default_rng([seed, 3, draw]))
 
 
-def _diameter(body: Body, bare: Sequence[Shot]) -> float:
-    """Of the object, or of what is left of it in the scans."""
-    truth = {s.scan.name: s.world_from_sensor for s in bare if s.world_from_sensor is not None}
-    left = object_diameter([shot.scan for shot in bare], truth)
-    return min(left, principal_diameter(body.mesh.vertices))
-
-
 def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scene:
     """Shuffle, rename, and move every scan into a random frame."""
     rng = np.random.default_rng([seed, 2])
@@ -173,23 +147,15 @@ def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scen
     truth: dict[str, Pose] = {}
     for number, k in enumerate(rng.permutation(len(shots)), start=1):
         shot, name = shots[k], f"scan_{number:02d}"
-        motion = Pose(
-            rotation=random_rotation(rng),
-            translation=rng.uniform(-2 * diameter, 2 * diameter, size=3),
-        )
-        sensor = shot.scan.scan_from_sensor
-        scans.append(
-            replace(
-                shot.scan,
-                name=name,
-                points=motion.apply(shot.scan.points),
-                scan_from_sensor=None if sensor is None else motion @ sensor,
-            )
-        )
+        shift = 2 * diameter
+        motion = Pose(rotation=random_rotation(rng), translation=rng.uniform(-shift, shift, size=3))
+        points, sensor = motion.apply(shot.scan.points), shot.scan.scan_from_sensor
+        sensor = None if sensor is None else motion @ sensor
+        scans.append(replace(shot.scan, name=name, points=points, scan_from_sensor=sensor))
         of[name] = shot
         if shot.world_from_sensor is not None:
             truth[name] = shot.world_from_sensor @ motion.inverse()
-    is_open = {n for n, s in of.items() if (body.symmetry or not s.sees_mark) and s.world == 0}
+    is_open = {n for n, s in of.items() if (body.is_symmetric or not s.sees_mark) and s.world == 0}
     return Scene(
         scans=scans,
         truth=truth,
@@ -197,7 +163,6 @@ def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scen
         sources={name: shot.scan.name for name, shot in of.items()},
         factors={name: shot.factor for name, shot in of.items() if shot.factor != 1.0},
         is_open=frozenset(is_open & set(truth)),
-        symmetry=body.symmetry,
         diameter=diameter,
         centroids=scan_centroids(scans),
     )

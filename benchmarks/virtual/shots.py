@@ -8,10 +8,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from benchmarks.virtual.bodies import Body
+from benchmarks.virtual.bodies import Body, middle
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, view_of
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, rotation_exp
@@ -21,7 +21,6 @@ PIXELS = 240.0
 """Pixels across the object's diameter, where a scenario does not say otherwise."""
 SLIGHT = NoiseModel(depth_diameters=5e-4, dropout=0.01, grazing_dropout=0.6)
 """What a good scanner does to depth."""
-ELEVATIONS_DEG = (20.0, -10.0)
 JITTER_DEG = 5.0
 OVERLAP_SAMPLES = 1500
 OVERLAP_SPACINGS = 1.5
@@ -29,26 +28,37 @@ OVERLAP_SPACINGS = 1.5
 
 Rng = np.random.Generator
 Views = Callable[[Body, Rng], list[View]]
-"""Where a body is scanned from."""
+"""Where a body is scanned from: one of the functions below, its settings bound."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Shot:
-    """A scan in its sensor's frame.
+    """A scan in its sensor's frame."""
 
-    Attributes:
-        scan: With a grid and a camera.
-        world_from_sensor: Where the sensor stood; None if the scan belongs nowhere.
-        world: Number of the world: 0 for the object, another one for another object.
-        factor: By which the scan is too large.
-        sees_mark: Whether the scan shows what tells the object from a symmetric one.
-    """
+    scan: RangeScan  # With a grid and a camera, as long as nothing took them away
+    world_from_sensor: Pose | None  # Where the sensor stood; None if the scan belongs nowhere
+    world: int = 0  # Number of the world: 0 for the object, another one for another object
+    factor: float = 1.0  # By which the scan is too large
+    sees_mark: bool = True  # Whether the scan shows what tells the object from a symmetric one
 
-    scan: RangeScan
-    world_from_sensor: Pose | None
-    world: int = 0
-    factor: float = 1.0
-    sees_mark: bool = True
+    @property
+    def pose(self) -> Pose:
+        """world_from_sensor of a scan that belongs somewhere."""
+        assert self.world_from_sensor is not None
+        return self.world_from_sensor
+
+    @property
+    def world_points(self) -> FloatArray:
+        """(N, 3)."""
+        return self.pose.apply(self.scan.points)
+
+    def only(self, kept: BoolArray) -> "Shot":
+        """Some of the points."""
+        return replace(self, scan=self.scan.only(kept))
+
+    def named(self, name: str) -> "Shot":
+        """Made from something else, in words."""
+        return replace(self, scan=replace(self.scan, name=name))
 
 
 Taking = Callable[[Body, list[View], NoiseModel, int], list[Shot]]
@@ -69,69 +79,55 @@ def take(mesh: TriangleMesh, view: View, noise: NoiseModel, seed: int, number: i
 
 
 def ring(
+    body: Body,
+    rng: Rng,
+    *,
     count: int,
     step_deg: float | None = None,
-    *,
-    pixels: tuple[float, ...] = (PIXELS,),
-    elevations_deg: tuple[float, ...] = ELEVATIONS_DEG,
-    model: CameraModel = CameraModel.PINHOLE,
-    distance_diameters: float = 3.0,
-) -> Views:
+    pixels: Sequence[float] = (PIXELS,),
+    elevations_deg: Sequence[float] = (20.0, -10.0),
+    **lens: CameraModel | float,
+) -> list[View]:
     """Views around the object, by turns from a little above and below, the sensor rolled."""
     step = 360.0 / count if step_deg is None else step_deg
-
-    def views(body: Body, rng: Rng) -> list[View]:
-        jitter = rng.uniform(-JITTER_DEG, JITTER_DEG, size=(count, 2))
-        return [
-            view_of(
-                body.mesh,
-                step * k + jitter[k, 0],
-                elevations_deg[k % len(elevations_deg)] + jitter[k, 1],
-                rng.uniform(-180, 180),
-                pixels=pixels[k % len(pixels)],
-                model=model,
-                distance_diameters=distance_diameters,
-            )
-            for k in range(count)
-        ]
-
-    return views
+    jitter = rng.uniform(-JITTER_DEG, JITTER_DEG, size=(count, 2))
+    return [
+        view_of(
+            body.mesh,
+            step * k + jitter[k, 0],
+            elevations_deg[k % len(elevations_deg)] + jitter[k, 1],
+            rng.uniform(-180, 180),
+            pixels=pixels[k % len(pixels)],
+            **lens,  # type: ignore[arg-type]  # model and distance_diameters
+        )
+        for k in range(count)
+    ]
 
 
-def on_sphere(count: int) -> Views:
+def on_sphere(body: Body, rng: Rng, *, count: int) -> list[View]:
     """Views from directions drawn evenly from the sphere."""
-
-    def views(body: Body, rng: Rng) -> list[View]:
-        return [
-            view_of(
-                body.mesh,
-                rng.uniform(0, 360),
-                float(np.degrees(np.arcsin(rng.uniform(-1, 1)))),
-                rng.uniform(-180, 180),
-                pixels=PIXELS,
-            )
-            for _ in range(count)
-        ]
-
-    return views
+    return [
+        view_of(
+            body.mesh,
+            rng.uniform(0, 360),
+            float(np.degrees(np.arcsin(rng.uniform(-1, 1)))),
+            rng.uniform(-180, 180),
+            pixels=PIXELS,
+        )
+        for _ in range(count)
+    ]
 
 
-def twice(views: Views, count: int, apart_deg: float) -> Views:
-    """The first of the views again, each turned a little about the object's middle."""
-
-    def both(body: Body, rng: Rng) -> list[View]:
-        low, high = body.mesh.vertices.min(axis=0), body.mesh.vertices.max(axis=0)
-        middle = 0.5 * (low + high)
-        found = views(body, rng)
-        beside = []
-        for view in found[:count]:
-            axis = rng.normal(size=3)
-            turn = rotation_exp(np.radians(apart_deg) * axis / np.linalg.norm(axis))
-            about = Pose(rotation=turn, translation=middle - turn @ middle)
-            beside.append(replace(view, world_from_sensor=about @ view.world_from_sensor))
-        return found + beside
-
-    return both
+def twice(body: Body, rng: Rng, *, views: Views, count: int, apart_deg: float) -> list[View]:
+    """Views, and the first of them again, each turned a little about the object's middle."""
+    centre, found = middle(body.mesh), views(body, rng)
+    beside = []
+    for view in found[:count]:
+        axis = rng.normal(size=3)
+        turn = rotation_exp(np.radians(apart_deg) * axis / np.linalg.norm(axis))
+        about = Pose(rotation=turn, translation=centre - turn @ centre)
+        beside.append(replace(view, world_from_sensor=about @ view.world_from_sensor))
+    return found + beside
 
 
 def is_chain(shots: Sequence[Shot], min_overlap: float) -> bool:
@@ -142,23 +138,11 @@ def is_chain(shots: Sequence[Shot], min_overlap: float) -> bool:
 
 def shot_overlaps(shots: Sequence[Shot]) -> FloatArray:
     """Shares of points that lie on the other scan, the smaller of both ways, (N, N)."""
-    trees = [KDTree(_world_points(shot)) for shot in shots]
+    trees = [KDTree(shot.world_points) for shot in shots]
     few = [tree.data[:: max(1, tree.n // OVERLAP_SAMPLES)] for tree in trees]
-    reach = [_reach(tree, own) for tree, own in zip(trees, few, strict=True)]
+    spacing = [np.median(t.query(own, k=2)[0][:, 1]) for t, own in zip(trees, few, strict=True)]
+    reach = OVERLAP_SPACINGS * np.array(spacing)
     shares = np.array(
-        [
-            [(tree.query(own)[0] < near).mean() for tree, near in zip(trees, reach, strict=True)]
-            for own in few
-        ]
+        [[(t.query(own)[0] < r).mean() for t, r in zip(trees, reach, strict=True)] for own in few]
     )
     return np.minimum(shares, shares.T)
-
-
-def _reach(scan: KDTree, few: FloatArray) -> float:
-    """Distance within which points lie on a scan, by the spacing of its points about some."""
-    return OVERLAP_SPACINGS * float(np.median(scan.query(few, k=2)[0][:, 1]))
-
-
-def _world_points(shot: Shot) -> FloatArray:
-    assert shot.world_from_sensor is not None
-    return shot.world_from_sensor.apply(shot.scan.points)

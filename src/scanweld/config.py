@@ -37,15 +37,15 @@ class PrepareConfig(Section):
     jump_pixels: float = Field(default=6.0, gt=1)
     """Depth step between neighbouring pixels, in footprints, above which the surface is cut."""
     closing_diameters: float = Field(default=0.03, ge=0, le=0.2)
-    """Radius by which the silhouette is closed before what lies outside it counts as free."""
+    """Radius of the morphological closing of the silhouette, outside of which pixels are free."""
     rim_pixels: int = Field(default=2, ge=1)
-    """Width of the rim along jumps, holes and the silhouette."""
+    """Width of the rim along depth jumps, holes and the silhouette, where depth is unreliable."""
     min_cosine: float = Field(default=0.15, ge=0, lt=1)
-    """Cosine between normal and viewing ray below which a place is too oblique for a sample."""
+    """Cosine of incidence below which a pixel is too oblique for a sample or a keypoint."""
     support: Literal["left out", "kept"] = "left out"
-    """What becomes of the table that the object stands on, where most scans show one."""
+    """Whether the table that the object stands on is left out, where most scans show one."""
     num_samples: int = Field(default=800, ge=100)
-    """Oriented samples of a scan, at most."""
+    """Oriented sample points of a scan, at most."""
 
 
 class HeatConfig(Section):
@@ -62,40 +62,42 @@ class HeatConfig(Section):
     group_diameters: float = Field(default=0.05, gt=0)
     """Keypoints nearer than this, with like signatures, become one."""
     surface: Literal["closed", "open", "clamped"] = "closed"
-    """What heat spreads on: the front closed by walls and a back plane, as published; the front
-    alone, whose rims let no heat out, or keep cold."""
+    """The surface on which heat spreads: the front closed by side walls and a back plane, as
+    published; or the front alone, its border insulated ("open") or kept cold ("clamped")."""
     jumps: Literal["cut", "bridged"] = "cut"
-    """Whether the front is cut at depth jumps, or goes on across them."""
+    """Whether the front is cut at depth jumps, or continued across them."""
     times: Literal["resolved", "sun"] = "resolved"
     """Diffusion times as above, or those of Sun et al.: 4 ln 10 over the last and first
     eigenvalues."""
 
 
 class PairsConfig(Section):
-    """Pair registration from any start pose."""
+    """Pair registration without a start pose."""
 
     keypoints: Literal["mixed", "heat", "even"] = "mixed"
-    """What anchors the hypotheses: PA-HKS keypoints ("heat"), evenly spread points, or both."""
+    """Points that are matched to make hypotheses: PA-HKS keypoints ("heat"), evenly spread points
+    ("even"), or both."""
     num_anchors: int = Field(default=64, ge=8)
-    """Evenly spread anchors of a scan: a fixed number covers thin objects as well as stout ones."""
+    """Evenly spread points of a scan that are matched. Their number is fixed, so that it is enough
+    for thin objects as well as for thick ones."""
     num_turns: int = Field(default=24, ge=8)
-    """Turns about the normal that are tried for each pair of anchors."""
+    """Rotations about the normal that are tried for each pair of matched points."""
     tolerance_diameters: tuple[Positive, Positive, Positive] = (0.04, 0.02, 0.012)
-    """Depth tolerance of the evidence, coarse to fine."""
+    """Depth difference up to which two surfaces agree, in the coarse, middle and fine stage."""
     num_survivors: tuple[Count, Count] = (1600, 100)
-    """Hypotheses that go on to the first and to the second refinement."""
+    """Hypotheses that are kept for the first and for the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
-    """Distinct poses of a pair that go on to the view graph."""
+    """Distinct poses of a pair that are passed to the view graph, at most."""
     min_score: float = Field(default=0.10, ge=0, le=1)
     """Score below which a pair is not accepted on its own."""
     max_violated_share: float = Field(default=0.5, ge=0)
-    """Samples that the other sensor contradicts in any way, as a share of those that agree, above
-    which a pair is not accepted on its own: wrong poses often agree widely, but not cleanly."""
+    """Number of samples that the other sensor contradicts over the number that agree, above which a
+    pair is not accepted on its own. Wrong poses often agree on much, but contradict much too."""
     min_margin: float = Field(default=0.4, ge=0, le=1)
-    """Share of the score by which the best pose must beat its best distinct rival."""
+    """Share of its score by which the best pose must beat the best distinct alternative."""
     min_observability: float = Field(default=2.5e-4, ge=0)
-    """Smallest over largest eigenvalue of the information that noise cannot feign, below which a
-    pose slides."""
+    """Smallest over largest eigenvalue of the information matrix, less what noise contributes to
+    it, below which the pose can slide."""
 
     @property
     def fine_tolerance_diameters(self) -> float:
@@ -106,53 +108,56 @@ class PairsConfig(Section):
 class CoarseConfig(Section):
     """Coarse registration as published (paper 3.1), for the method "paper" only.
 
-    The paper leaves open what is read here; the defaults are the reading that did best.
+    Where the paper leaves something open, the default is the reading that did best.
     """
 
     mutual: bool = False
-    """Whether matched signatures must be each other's nearest; as printed, only s asks (eq. 1)."""
+    """Whether matched signatures must be each other's nearest; as printed (eq. 1), it is enough
+    that one is the other's nearest."""
     max_signature_distance: float | None = Field(default=None, gt=0)
-    """Threshold of eq. 1: root mean square difference of the log signatures. By the quantile if
-    None."""
+    """Threshold of eq. 1 on the root mean square difference of the log signatures; if None, it is
+    set by the quantile below."""
     signature_quantile: float = Field(default=1.0, gt=0, le=1)
     """The threshold of eq. 1 as a quantile of the matches' distances: 0.5 is the median, 1 keeps
-    all. Every threshold did worse: it takes away right matches like wrong ones."""
+    all. Every lower threshold did worse, because it removes right and wrong matches alike."""
     icp: Literal["keypoints", "surface"] = "surface"
-    """What the ICP aligns: the matched keypoints alone, or the scans' surfaces."""
+    """Points that the ICP aligns: the matched keypoints alone, or the scans' surfaces."""
     trim: Share | Literal["auto"] | None = None
-    """Share of the closest points that the ICP goes by, or "auto"; all if None."""
+    """Share of the matches, the closest ones, that the ICP uses; found in each step if "auto", all
+    if None."""
     start: Literal["fit", "consensus", "evidence"] = "fit"
-    """Where the ICP starts: at a fit to all matches, as published; or, ours, where most of the
-    nearest signatures agree, or at the poses of keypoints that the sensors' evidence speaks for,
-    whatever the signatures."""
+    """Start of the ICP: a fit to all matches, as published ("fit"). Not in the paper: the pose on
+    which most of the nearest signatures agree ("consensus"), or the poses from pairs of keypoints
+    that agree best with the range images, whatever the signatures ("evidence")."""
     num_nearest: int = Field(default=8, ge=1)
-    """Nearest signatures that are tried for each keypoint where the matches must agree."""
+    """Nearest signatures that are tried for each keypoint in a consensus."""
 
 
 class GraphConfig(Section):
     """Pairs -> poses of all scans that can be placed."""
 
     max_cycle_deg: float = Field(default=5.0, gt=0)
-    """Closing error above which a cycle of pairs contradicts itself."""
+    """Rotation error above which a closed cycle of pairs contradicts itself."""
     max_cycle_diameters: float = Field(default=0.03, gt=0)
-    """The same for the shift of the middle of a scan."""
+    """The same for the displacement of a scan's centre."""
     min_edge_score: float = Field(default=-0.05, ge=-1, le=1)
-    """Score below which a pair is not called accepted even where it agrees with the poses."""
+    """Score below which a pair is not accepted even where it agrees with the final poses."""
     min_mutual_score: float = Field(default=0.15, ge=0)
-    """Least score of a merge that rests on several weak pairs that propose the same motion."""
+    """Least score of a merge that several weak pairs propose together."""
     max_mutual_violated_share: float = Field(default=0.1, ge=0)
-    """Most samples that the other sensors contradict in such a merge, as a share of those that
-    agree."""
+    """Number of samples that the other sensors contradict in such a merge over the number that
+    agree, at most."""
     min_margin: float = Field(default=0.2, ge=0, le=1)
     """Share of its score by which a merge must beat the best distinct one."""
     max_violated_share: float = Field(default=0.15, ge=0)
-    """Samples that the other sensors contradict, as a share of those that agree, above which a
+    """Number of samples that the other sensors contradict over the number that agree, above which a
     merge is refused and a placed scan is doubtful."""
     max_inner_violated_share: float = Field(default=0.075, ge=0)
-    """The same of a merge at second sight: all scans have settled in it, and edges say nothing."""
+    """The same when a refused merge is judged again after all its scans were refined, without the
+    pixels along depth edges."""
     max_violation: float = Field(default=0.03, ge=0)
-    """Share of samples by which violation may exceed half the agreement in any pair across a
-    merge."""
+    """Share of the samples by which the contradicted ones may exceed half of those that agree, in
+    any pair of scans across a merge."""
 
 
 class ContoursConfig(Section):
@@ -167,12 +172,12 @@ class ContoursConfig(Section):
     prunings: tuple[Pruning, ...] = ("self-occlusion", "observed", "predicted")
     """Which prunings are made: the first (eq. 4), the second (eq. 5), the third (eq. 6)."""
     self_occlusion: Literal["border", "place"] = "border"
-    """What eq. 4 takes away: predicted contours seen on triangles at the rim of their own scan, or
-    those at the same place in space as its contours."""
+    """Predicted contours that eq. 4 removes: those seen on triangles at the border of their own
+    scan, or those at the same place in space as its contours."""
     predicted_visibility: Literal["face", "depth", "observed normal", "printed"] = "face"
-    """What eq. 6 asks of a predicted contour point: that the rendered face looks towards camera j,
-    that it is not behind what j observed, that the surface observed by j in its pixel looks towards
-    camera j, or (as printed) towards camera i."""
+    """Condition of eq. 6 on a predicted contour point: the rendered face looks towards camera j;
+    the point is not behind what j observed; the surface that j observed in its pixel looks towards
+    camera j; or (as printed) towards camera i."""
     matching: Literal["trimmed", "mutual"] = "trimmed"
     """Closest observed points, the farthest left out (MM-ICC), or only pairs of points that are
     closest to each other (M-ICC)."""
@@ -183,9 +188,9 @@ class ContoursConfig(Section):
     num_steps: int = Field(default=3, ge=1)
     """Inner iterations between two renderings."""
     residual: Literal["point", "image", "point, image", "normal"] = "point, image"
-    """What is minimised of the contours matched: their distance in space, as in trimmed ICP, which
-    gets in from afar; their distance in the image, which is M-ICC's and lies closer; the one after
-    the other; or, ours, both and then the distance across the outline alone."""
+    """Distance of matched contours that is minimised: in space, as in trimmed ICP, which converges
+    from farther away; in the image, as in M-ICC, which ends closer to the truth; the one after the
+    other; or (not in the paper) both, and then the distance across the outline alone."""
 
 
 class RefineConfig(Section):
@@ -196,54 +201,54 @@ class RefineConfig(Section):
     match_diameters: tuple[Positive, Positive] = (0.02, 0.006)
     """Farthest match, in the first and in the last round."""
     contour_weight: float = Field(default=0.3, ge=0)
-    """Weight of a contour match beside a surface match of the same precision; 0 leaves contours
-    out."""
+    """Weight of a contour match relative to a surface match of the same precision; 0 leaves
+    contours out."""
 
 
 class ConfidenceConfig(Section):
     """Evidence -> probability that a pose is right."""
 
     min_good: float = Field(default=0.9, ge=0, le=1)
-    """Confidence below which a placed scan is doubtful. Of 44 wrong scans of the calibration 4 had
-    more, held out."""
+    """Confidence below which a placed scan is marked doubtful."""
 
 
 class FusionConfig(Section):
     """Posed scans -> one mesh."""
 
     voxel_resolutions: float = Field(default=1.0, gt=0)
-    """Edge of a voxel, where that is not too fine for the number of voxels below."""
+    """Edge of a voxel, unless the limit on the number of voxels below asks for a larger one."""
     max_voxels_across: int = Field(default=1000, ge=50)
     """Voxels across the object's diameter, at most."""
     truncation_voxels: float = Field(default=4.0, ge=2)
-    """Distance at which the signed distance is cut off."""
+    """Truncation of the signed distance."""
     with_doubtful: bool = False
-    """Whether doubtful scans are part of the model too: they are placed, but may be wrong."""
+    """Whether doubtful scans, which are placed but may be wrong, are fused too."""
     holes: Holes = "open"
-    """What becomes of what no scan saw: left open, spanned by a membrane ("fill"), or bounded by
-    the space that was seen empty ("carve"). What was not measured is marked in the model."""
+    """What is done where no scan saw the surface: it is left open, closed by a membrane ("fill"),
+    or closed along the border of the space that was seen empty ("carve"). Vertices that were not
+    measured are marked in the model."""
     component: Component = "all"
-    """Whether every connected piece is kept that is no crumb, or only the largest."""
+    """Whether all connected pieces are kept, except very small ones, or only the largest."""
     watertight: bool = False
     """Whether the mesh must be closed: holes are filled, unless they are carved."""
     smooth: int = Field(default=0, ge=0, le=1000)
-    """Rounds of smoothing that does not shrink (Taubin 1995); borders stay."""
+    """Rounds of smoothing that does not shrink the model (Taubin 1995); borders stay."""
     faces: int | None = Field(default=None, ge=4)
-    """Triangles of the model, about; all that the voxels give if not given."""
+    """Approximate number of triangles of the model; no limit if not given."""
 
 
 class Config(Section):
-    """All settings of a run; ``Config()`` is what users get who give none."""
+    """All settings of a run; ``Config()`` holds the defaults."""
 
     seed: int = Field(default=0, ge=0)
-    """Seed of everything random in a run. No stage draws random numbers as it stands, so that the
-    scans' content and the other settings alone fix the output's bytes."""
+    """Seed of everything random in a run. At present no stage draws random numbers: the scans and
+    the other settings determine every byte of the output."""
     method: Method = "robust"
-    """How poses are found: by the search from any start and the joint refinement ("robust"), or as
-    published, by PA-HKS matches with ICP and MM-ICC ("paper"); both are judged alike."""
+    """How poses are found: by an exhaustive search and joint refinement ("robust"), or as
+    published, by PA-HKS matches with ICP and MM-ICC ("paper"). The same rules judge both."""
     unit: Unit | None = None
-    """Unit of the scans' coordinates; unknown if not given. It is passed on with the settings in
-    the report, and nothing else depends on it."""
+    """Unit of the scans' coordinates; unknown if not given. It is written to the report with the
+    settings; nothing else depends on it."""
     prepare: PrepareConfig = PrepareConfig()
     heat: HeatConfig = HeatConfig()
     pairs: PairsConfig = PairsConfig()

@@ -1,6 +1,5 @@
 """A model in the formats of other tools: its poses, its surface and its points."""
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import natural_key, read_scan, write_whole
+from scanweld.io import natural_key, path_from, read_scan, write_whole
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
@@ -154,13 +153,10 @@ def _posed(
     output: Path,
 ) -> PosedScan:
     located = locate_sensor(sensors[name]) if name in sensors else None
-    file = None
-    if name in files:
-        file = Path(os.path.relpath(os.path.abspath(files[name]), output)).as_posix()
     return PosedScan(
         name=name,
         world_from_scan=pose,
-        file=file,
+        file=path_from(output, files[name]) if name in files else None,
         camera=None if located is None else located.camera,
         scan_from_sensor=None if located is None else located.scan_from_sensor,
     )

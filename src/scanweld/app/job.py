@@ -1,7 +1,6 @@
 """The main job, files to an output folder; and its report written anew."""
 
 import logging
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import ScanFile, collect, printable, read_scan
+from scanweld.io import ScanFile, collect, path_from, printable, read_scan
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline import run as pipeline
 from scanweld.preparation.thinning import thinned
@@ -82,10 +81,7 @@ def run_job(
 
 def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:
     """Where each scan's file is, by the scan's name, as seen from a folder."""
-    return {
-        file.name: printable(Path(os.path.relpath(os.path.abspath(file.path), folder)).as_posix())
-        for file in files
-    }
+    return {file.name: printable(path_from(folder, file.path)) for file in files}
 
 
 def read_all(

@@ -4,6 +4,7 @@ For an output ``model`` all work goes to ``.model.work`` beside it: a lock, the 
 finished (a rerun continues from there), and the folder that becomes the output in the end.
 """
 
+import contextlib
 import logging
 import shutil
 from collections.abc import Sequence
@@ -134,22 +135,31 @@ class Workspace:
     def _leave(self, *, keep: bool) -> None:
         """Remove the workspace or what is half done in it, and folders made that are empty."""
         if self._lock is not None:
-            self._clear(self.staging if keep else self.folder)
-        self._unlock()
-        for folder in reversed(self._made):
-            if folder.is_dir() and not any(folder.iterdir()):
+            for part in [self.staging] if keep else self._parts():
+                self._clear(part)
+        self._unlock(remove=not keep)
+        for folder in (*(() if keep else (self.folder,)), *reversed(self._made)):
+            # Another run may have begun in it by now: then it is not empty, and its own.
+            with contextlib.suppress(OSError):
                 folder.rmdir()
 
     def _clear(self, folder: Path) -> None:
         try:
-            if folder.exists():
+            if folder.is_dir():
                 shutil.rmtree(folder)
+            else:
+                folder.unlink(missing_ok=True)
         except OSError as error:
             logger.warning("%s: cannot be removed (%s); remove it by hand", folder, error.strerror)
 
-    def _unlock(self) -> None:
+    def _parts(self) -> list[Path]:
+        """What the workspace holds, but for the lock: that goes last of all."""
+        held = () if self._lock is None else self._lock.files
+        return [part for part in self.folder.iterdir() if part not in held]
+
+    def _unlock(self, *, remove: bool = False) -> None:
         if self._lock is not None:
-            self._lock.release()
+            self._lock.release(remove=remove)
             self._lock = None
 
 

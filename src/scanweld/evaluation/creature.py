@@ -8,9 +8,9 @@ that hide each other, folds, thin parts, no symmetry, and no two sides alike.
 from dataclasses import dataclass
 
 import numpy as np
+from skimage.measure import marching_cubes
 
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
-from scanweld.geometry.marching_cubes import isosurface
 from scanweld.geometry.mesh import TriangleMesh, compact, pieces
 
 Point = tuple[float, float, float]
@@ -148,9 +148,11 @@ def creature(seed: int = 0, *, voxels: int = 200) -> TriangleMesh:
     field += _wrinkles(axes)
     # A node exactly on the surface would give faces without area.
     field[np.abs(field) < 1e-3 * step] = 1e-3 * step
-    nodes, faces = isosurface(field)
-    vertices, faces = _largest_body(low + step * nodes, faces)
-    return TriangleMesh(vertices=vertices * _TRUNK_LENGTH, faces=faces, colors=_coat(vertices))
+    vertices, faces, _, _ = marching_cubes(field, 0.0, spacing=(step, step, step))
+    vertices, faces = _largest_body(vertices.astype(np.float64) + low, faces)
+    return TriangleMesh(
+        vertices=vertices * _TRUNK_LENGTH, faces=_outward(vertices, faces), colors=_coat(vertices)
+    )
 
 
 def _varied(limbs: tuple[Limb, ...], seed: int) -> tuple[Limb, ...]:
@@ -230,3 +232,10 @@ def _largest_body(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, In
     largest = np.argmax(np.bincount(body))
     vertices, faces, _ = compact(vertices, faces[body[faces[:, 0]] == largest])
     return vertices, faces
+
+
+def _outward(vertices: FloatArray, faces: IntArray) -> IntArray:
+    """Faces counter-clockwise from outside: the volume that they enclose is positive."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    volume = np.einsum("nk,nk->", a, np.cross(b, c))
+    return faces if volume > 0 else faces[:, ::-1]

@@ -6,16 +6,19 @@ from itertools import product
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.directions import golden_spiral
+from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, compact
 
 
 def sphere(radius: float = 50.0) -> TriangleMesh:
-    """A ball about the origin."""
-    num_vertices = 10_000
-    heights = 1.0 - (2.0 * np.arange(num_vertices) + 1.0) / num_vertices
-    return _convex(radius * golden_spiral(heights))
+    """A ball about the origin: an icosahedron whose faces are split into four, five times."""
+    golden = 0.5 * (1 + np.sqrt(5))
+    corners = np.array([(a, b, 0.0) for a in (-1.0, 1.0) for b in (-golden, golden)])
+    ball = _convex(_unit(np.concatenate([np.roll(corners, shift, axis=1) for shift in range(3)])))
+    vertices, faces = ball.vertices, ball.faces
+    for _ in range(5):
+        vertices, faces = _split_in_four(vertices, faces)
+    return TriangleMesh(vertices=radius * vertices, faces=faces)
 
 
 def box(x: float = 60.0, y: float = 80.0, z: float = 100.0) -> TriangleMesh:
@@ -60,6 +63,22 @@ def lathe(
     faces.append(np.stack([np.full_like(last, top), last, np.roll(last, -1)], axis=-1))
     vertices, used, _ = compact(vertices, np.concatenate(faces))
     return TriangleMesh(vertices=vertices, faces=used)
+
+
+def _split_in_four(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Triangles on the unit sphere split at the middles of their edges, which move onto it."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, number = np.unique(edges, axis=0, return_inverse=True)
+    ab, bc, ca = len(vertices) + number.reshape(-1, 3).T
+    a, b, c = faces.T
+    parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    middles = _unit(vertices[unique].mean(axis=1))
+    split = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return np.concatenate([vertices, middles]), split
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _convex(points: FloatArray) -> TriangleMesh:

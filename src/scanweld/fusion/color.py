@@ -7,10 +7,10 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import KDTree
 
+from scanweld.fusion.agreement import weights_at
 from scanweld.fusion.noise import MIN_COMMON
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import sample_colors
-from scanweld.fusion.support import weights_at
 from scanweld.geometry.arrays import ByteArray, FloatArray
 
 logger = logging.getLogger(__name__)

@@ -22,7 +22,7 @@ from scanweld.geometry.mesh import (
 logger = logging.getLogger(__name__)
 
 _MIN_PIECE_VOXELS = 50.0
-"""Pieces with less area than so many squared voxels are dropped, too."""
+"""Area, in squared voxels, below which a connected piece is dropped whatever its share."""
 _TAUBIN_STEPS = (0.5, -0.53)
 """Taubin's factors lambda and mu: a smoothing step, and one that undoes the shrinking."""
 
@@ -96,7 +96,7 @@ def smoothed(
         vertices: (V, 3).
         faces: (F, 3).
         rounds: Of both steps.
-        membrane: (V,) vertices that move alone, and may shrink; all, without, if not given.
+        membrane: (V,) the only vertices that move, with shrinking; if not given, all move without.
     """
     if not rounds or (membrane is not None and not membrane.any()):
         return vertices

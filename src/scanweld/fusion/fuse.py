@@ -8,6 +8,7 @@ import numpy as np
 
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
+from scanweld.fusion.agreement import measure_agreement
 from scanweld.fusion.color import blend_colors
 from scanweld.fusion.finish import (
     chosen_pieces,
@@ -20,7 +21,6 @@ from scanweld.fusion.holes import closed_field
 from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
 from scanweld.fusion.sheets import NORMAL_ROUNDS, without_second_sheets
-from scanweld.fusion.support import measure_support
 from scanweld.fusion.surface import extract_surface, vertex_flags
 from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -32,14 +32,13 @@ from scanweld.work.threads import map_in_order
 
 logger = logging.getLogger(__name__)
 
-_MIN_PIXELS = 10
-"""Surface pixels of all scans together, at least."""
 _FINE_SHARE = 0.25
-"""Voxels are as fine as this share of the scans: coarser ones must not blur what these saw."""
+"""Quantile of the scans' resolutions that sets the voxels: one fine scan is no reason for fine
+voxels everywhere, but where a quarter of the scans are fine, the coarse ones must not blur them."""
 _PINHOLE_VOXELS = 12.0
-"""Holes with so short a border come from single cells, whose corners no scan measured all."""
+"""Length of the border, in voxels, up to which a hole is closed: it comes from a single cell."""
 _FILLED_ROUNDS = 20
-"""Smoothing of what closes holes: the space that was seen empty has steps."""
+"""Rounds of smoothing of the faces that close holes: the border of space seen empty has steps."""
 
 
 def fuse(
@@ -50,7 +49,7 @@ def fuse(
     prepare: PrepareConfig | None = None,
     workers: int = 1,
 ) -> TriangleMesh:
-    """Fuse posed scans into one mesh, trimmed to what they saw.
+    """Fuse posed scans into one mesh, cut off where no scan saw a surface.
 
     Args:
         scans: Prepared scans of one object; their order does not matter.
@@ -60,17 +59,17 @@ def fuse(
         workers: Threads; the result is the same for any number.
 
     Returns:
-        The mesh in the world frame with unit normals that point out, the support and the standard
-        deviation of each vertex, and with colours if one of the scans has them.
+        The mesh in the world frame with unit normals that point out, the number of scans that
+        agree on each vertex, its standard deviation, and colours if one of the scans has them.
 
     Raises:
-        InputError: If the scans hold no surface to fuse, or lie too far apart.
+        InputError: If there is no surface to fuse, or the scans lie too far apart.
         ValueError: If there are not as many poses as scans.
     """
     if len(scans) != len(world_from_sensor):
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
-    if sum(len(scan.mesh.vertices) for scan in scans) < _MIN_PIXELS:
-        raise InputError("the scans hold no surface that could be fused")
+    if not scans:
+        raise InputError("there is no surface to fuse: give at least one scan")
     images = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), workers)
     voxel = voxel_edge(scans, config)
     depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
@@ -79,12 +78,15 @@ def fuse(
     logger.debug("%d blocks of voxels of %.4g", len(volume.blocks), voxel)
     vertices, faces, filled = _surface(volume, images, depth, config, workers)
     if not len(faces):
-        raise InputError("the posed scans hold no surface that could be fused; see their poses")
+        raise InputError(
+            "no surface is left of the posed scans, because they contradict each other everywhere: "
+            "check their poses"
+        )
     vertices = smoothed(vertices, faces, config.smooth)
     if config.faces is not None:
         vertices, faces, filled = decimated(vertices, faces, filled, config.faces)
     logger.debug("fused %d scans into %d faces", len(scans), len(faces))
-    return _dressed(vertices, faces, filled, images, voxel)
+    return _with_attributes(vertices, faces, filled, images, voxel)
 
 
 def _images(
@@ -94,7 +96,7 @@ def _images(
     prepare: PrepareConfig,
     workers: int,
 ) -> list[PosedImage]:
-    """The scans' images at full resolution, in an order of their own."""
+    """The scans' images at full resolution, in an order that depends on their content alone."""
     posed = sorted(
         zip(scans, world_from_sensor, strict=True),
         key=lambda both: (both[0].content_hash, both[1].matrix().tobytes()),
@@ -163,30 +165,30 @@ def _surface(
 def _seen_part(
     vertices: FloatArray, faces: IntArray, images: Sequence[PosedImage], voxel: float
 ) -> tuple[FloatArray, IntArray]:
-    """What was seen of the surface, without what lies between and beyond, as a manifold."""
+    """The part of the surface that scans agree on, as a manifold without double layers."""
     normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
-    support = measure_support(images, vertices, normals, voxel)
-    faces = faces[(support.count > 0)[faces].all(axis=1)]
-    return without_second_sheets(vertices, faces, support, voxel)
+    agreement = measure_agreement(images, vertices, normals, voxel)
+    faces = faces[(agreement.count > 0)[faces].all(axis=1)]
+    return without_second_sheets(vertices, faces, agreement, voxel)
 
 
-def _dressed(
+def _with_attributes(
     vertices: FloatArray,
     faces: IntArray,
     filled: BoolArray,
     images: Sequence[PosedImage],
     voxel: float,
 ) -> TriangleMesh:
-    """The mesh with what is known of each vertex."""
+    """The mesh with normals, colours and accuracy of each vertex."""
     normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
-    support = measure_support(images, vertices, normals, voxel)
-    filled = filled | (support.count == 0)
+    agreement = measure_agreement(images, vertices, normals, voxel)
+    filled = filled | (agreement.count == 0)
     return TriangleMesh(
         vertices=vertices,
         faces=faces,
         normals=normals,
         colors=blend_colors(vertices, normals, images, 2.0 * voxel),
-        support=np.where(filled, 0, support.count),
-        stdev=np.where(filled, np.nan, support.stdev),
+        support=np.where(filled, 0, agreement.count),
+        stdev=np.where(filled, np.nan, agreement.stdev),
         filled=filled,
     )

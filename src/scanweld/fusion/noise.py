@@ -16,7 +16,7 @@ from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 logger = logging.getLogger(__name__)
 
 _NUM_POINTS = 1500
-"""Points of a scan that are held against the others, about."""
+"""Points of a scan that are compared with the others, about."""
 MIN_COMMON = 50
 """Points that two scans must have in common to be compared."""
 _REACH_PIXELS = 4.0

@@ -1,4 +1,4 @@
-"""What a posed scan says to the volume: its surface with weights, and rays that went on."""
+"""A posed scan ready for fusion: its weighted surface, and the rays that met nothing."""
 
 import logging
 from collections.abc import Sequence
@@ -30,15 +30,16 @@ _RIM_WEIGHT = 0.05
 _RAMP_PIXELS = 6.0
 """Distance from the rim at which a pixel has its full weight."""
 _FREE_PIXELS = 10.0
-"""Free pixels of the working image nearer to the silhouette do not carve."""
+"""Free pixels of the working image nearer to the silhouette than this do not show empty space."""
 _MAX_LOST = 0.02
-"""An image on whose free pixels lies this share of another scan's surface does not carve there."""
+"""Share of another scan's surface in front of an image's free pixels at which these are trusted no
+more: the sensor lost returns."""
 _NUM_TRUST_POINTS = 2000
-"""Points of a scan by which the others' free pixels are judged, about."""
+"""Points of a scan with which the others' free pixels are checked, about."""
 _MARGIN_PIXELS = 2.0
 """Space around the surface that the image holds."""
 _MAX_NOISE_PIXELS = 0.5
-"""Noisier depth is smoothed in each scan; else the mean of the scans blurs less."""
+"""Noise of depth above which a scan is smoothed: below it, averaging scans blurs less."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -55,8 +56,8 @@ class PosedImage:
         pixel: Footprint of a pixel on the object.
         colors: (H, W, 3) as measured, black off the surface; or None.
         free_camera: Of the image below.
-        is_free: (h, w) pixels of the working image that saw past the object.
-        trust: How far they are believed, from 0 to 1.
+        is_free: (h, w) pixels of the working image whose rays passed the object.
+        trust: Weight of these rays, from 0 to 1.
         noise: Standard deviation of the surface's distance between pixels, along its normal.
         precision: What the scan's weights are multiplied by, about 1.
     """
@@ -122,10 +123,10 @@ def pose_image(
 
 
 def free_space_trusts(images: Sequence[PosedImage]) -> FloatArray:
-    """How far (N,) images are to be believed where they saw nothing, from 0 to 1.
+    """Weights (N,), from 0 to 1, of the images' pixels without a return as signs of empty space.
 
-    A pixel without a return is empty space for an ideal sensor only: a real one loses dark, oblique
-    and far parts of an object. One that lost a part of what another scan saw is not believed.
+    Only an ideal sensor gets a return from every surface: a real one loses dark, oblique and far
+    parts of an object. An image that lost a part of what another scan saw gets a low weight.
     """
     points = [_sparse(image) for image in images]
     trusts = np.ones(len(images))

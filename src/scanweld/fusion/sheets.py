@@ -1,41 +1,42 @@
-"""Where a surface lies double: two sheets that look the same way, one close behind the other."""
+"""Double layers of a surface: two sheets that face the same way, one close behind the other."""
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
+from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.finish import split_fans
-from scanweld.fusion.support import Support
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import smoothed_normals
 
 _SAME_SIDE = 0.7
-"""Cosine above which two sheets look the same way; the sides of a thin wall look apart."""
+"""Cosine of the angle between their normals above which two sheets face the same way; those of a
+thin wall face opposite ways."""
 _APART_VOXELS = (0.75, 3.0)
 """How far along the normal the other sheet lies, at least and at most."""
 _MAX_EDGES = 5
-"""Vertices that are no more edges apart are on one sheet."""
+"""Vertices no more than this number of edges apart are on the same sheet."""
 _RADIUS_VOXELS = 0.75
-"""Places on the normal are so far from a vertex of the other sheet, at most."""
+"""Distance from a point on the normal within which a vertex of the other sheet is looked for."""
 _MAX_PEELS = 8
-"""Rounds in which second sheets are taken off; two or three do."""
+"""Rounds of removing second sheets, at most; usually two or three are enough."""
 NORMAL_ROUNDS = 1
 """Rounds of averaging normals: thin triangles would tilt the normals of their corners."""
 
 
 def without_second_sheets(
-    vertices: FloatArray, faces: IntArray, support: Support, voxel: float
+    vertices: FloatArray, faces: IntArray, agreement: Agreement, voxel: float
 ) -> tuple[FloatArray, IntArray]:
-    """The surface as a manifold on which nothing lies double.
+    """The surface as a manifold without double layers.
 
-    Of two sheets the one goes that fewer scans support, or that is known worse. Sheets may hang
+    Of two sheets the one goes that fewer scans agree on, or that is known worse. Sheets may hang
     together by what has to go, or by a corner that they share, so that they are looked for after
     such corners were split, and again until there are none.
 
     Args:
         vertices: (V, 3), about a voxel apart.
         faces: (F, 3).
-        support: Of the vertices.
+        agreement: Of the scans on the vertices.
         voxel: Edge of a voxel.
 
     Returns:
@@ -54,8 +55,8 @@ def without_second_sheets(
         if not len(one):
             break
         two = other[one]
-        fewer = support.count[index[one]] - support.count[index[two]]
-        is_worse = support.stdev[index[one]] > support.stdev[index[two]]
+        fewer = agreement.count[index[one]] - agreement.count[index[two]]
+        is_worse = agreement.stdev[index[one]] > agreement.stdev[index[two]]
         goes = np.zeros(len(index), dtype=bool)
         goes[np.where((fewer < 0) | ((fewer == 0) & is_worse), one, two)] = True
         faces = faces[~goes[faces].any(axis=1)]

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
 from scanweld.fusion.posed_image import SingleArray
 from scanweld.fusion.volume import BLOCK, CHUNK, Volume, block_keys, blocks_of
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-from scanweld.geometry.marching_cubes import corner_offsets, crossed_edges
 
 _MIN_STEP = 0.02
 """Vertices keep this share of a voxel's edge away from its ends: no triangle shrinks to nothing."""
@@ -52,14 +52,19 @@ def _cell_edges(
         Keys (3 T,) of edges and values (3 T, 2).
     """
     padded = _with_neighbours(volume, distance, index)
-    shifted = [padded[:, i:, j:, k:][:, :BLOCK, :BLOCK, :BLOCK] for i, j, k in corner_offsets()]
-    corners = np.stack(shifted)
-    inside = corners < 0
-    is_crossed = inside.any(axis=0) & ~inside.all(axis=0) & np.isfinite(corners).all(axis=0)
+    offsets = corner_offsets()
+    corners = np.stack([padded[:, i:, j:, k:][:, :BLOCK, :BLOCK, :BLOCK] for i, j, k in offsets])
+    case = np.packbits(corners < 0, axis=0, bitorder="little")[0]
+    is_crossed = (case > 0) & (case < 255) & np.isfinite(corners).all(axis=0)
     cell = np.argwhere(is_crossed)
-    cells = BLOCK * volume.blocks[index[cell[:, 0]]] + cell[:, 1:]
-    nodes, axis, ends = crossed_edges(cells, corners[:, is_crossed].T)
-    return 3 * block_keys(nodes) + axis, ends.astype(np.float64)
+    edges = triangle_table().reshape(256, -1)[case[is_crossed]]
+    row, column = np.nonzero(edges >= 0)
+    edge = edges[row, column]
+    ends = edge_corners()[edge]
+    block, voxel = volume.blocks[index[cell[:, 0]]], cell[:, 1:]
+    base = (BLOCK * block + voxel)[row] + offsets[ends[:, 0]]
+    values = corners[:, is_crossed].T
+    return 3 * block_keys(base) + edge // 4, values[row[:, None], ends].astype(np.float64)
 
 
 def _with_neighbours(volume: Volume, distance: SingleArray, index: IntArray) -> SingleArray:

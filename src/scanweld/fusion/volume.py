@@ -1,7 +1,7 @@
 """A sparse volume of weighted signed distances, kept in blocks of voxels near the surface.
 
 After Curless and Levoy, A volumetric method for building complex models from range images (1996);
-distances are taken to the tangent plane of the pixel, carving only takes support away.
+distances are taken to the tangent plane of the pixel, and space seen empty only removes surface.
 """
 
 from collections.abc import Sequence
@@ -22,17 +22,18 @@ BLOCK = 8
 _KEY_BITS = 20
 """Voxel and block coordinates are below 2^20, so that three of them fit into one number."""
 _MARGIN_BLOCKS = 8
-"""Coordinates that stay free below the lowest block: holes may be closed there."""
+"""Block coordinates below the lowest block that stay free: closing holes may need them."""
 DEPTH_VOXELS = 1.5
 """Weights fall to nothing this far behind a surface, where the other side of a wall may be,"""
 DEPTH_SIGMAS = 3.0
 """or so many standard deviations of the noise, if that is more."""
 _MIN_DEEP_VOXELS = 0.7
-"""Voxels so far behind the surface are deep inside."""
+"""Voxels at least this far behind the surface are taken to be inside with certainty."""
 MIN_EMPTY = 0.3
-"""Sum of the weights of rays that tells that a voxel without a surface is empty."""
+"""Sum of the weights of the rays that passed through a voxel above which it is empty, where no
+surface was measured."""
 _MAX_STEP_VOXELS = 2.5
-"""Distances two voxels apart that differ by more are not of one surface."""
+"""Signed distances of voxels two apart that differ by more, in voxels, are of two surfaces."""
 CHUNK = 512
 """Blocks that are worked on together: bounds the memory, and is a worker's share."""
 
@@ -193,10 +194,15 @@ def blocks_of(keys: IntArray) -> IntArray:
 
 def _allocate(images: Sequence[PosedImage], voxel: float, truncation: float) -> Volume:
     bounds = [(p.min(axis=0), p.max(axis=0)) for p in (i.points() for i in images) if len(p)]
+    if not bounds:
+        raise InputError("the scans hold no surface to fuse: every pixel is seen too obliquely")
     low = np.min([low for low, _ in bounds], axis=0)
     high = np.max([high for _, high in bounds], axis=0)
     if float((high - low).max()) / voxel > 0.9 * 2**_KEY_BITS:
-        raise InputError("the posed scans lie too far apart to be fused; see their poses")
+        raise InputError(
+            "the posed scans cannot be fused, because they are spread over more than a million "
+            "voxels: check their poses, or ask for larger voxels"
+        )
     origin = low - truncation - (1 + _MARGIN_BLOCKS * BLOCK) * voxel
     keys = np.zeros(0, np.int64)
     for image in images:

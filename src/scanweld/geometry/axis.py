@@ -1,4 +1,4 @@
-"""A line in space that motions turn about."""
+"""An axis of rotation in space."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

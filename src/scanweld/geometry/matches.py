@@ -1,4 +1,4 @@
-"""Matches of two scans, each with the one direction in which it holds them together."""
+"""Matches of two scans, each with the one direction along which it constrains their pose."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ MIN_AGREEMENT = 0.8
 class Matches:
     """Points of scan i matched to scan j, in the sensor frame of j at the pose they were found.
 
-    A match pulls its point along a direction that belongs to j, by minus the residual: point to
-    plane where the direction is a surface normal of j, contour to contour where it is the normal
-    of a contour in j's image.
+    A match constrains its point along one direction, which belongs to j: a surface normal of j in a
+    point-to-plane match, the normal of a contour in j's image in a contour match. Moving the point
+    by minus the residual along it removes the error.
 
     Attributes:
         points: (N, 3) points of i.
         directions: (N, 3) unit directions of j.
-        residuals: (N,) signed distances from the place of j along the direction.
+        residuals: (N,) signed distances along the direction from the matched point of j.
     """
 
     points: FloatArray

@@ -21,10 +21,10 @@ class TriangleMesh:
         faces: (F, 3) vertex indices.
         normals: (V, 3) unit normals or None.
         colors: (V, 3) uint8 or None.
-        support: (V,) number of scans whose surface lies at each vertex, or None.
+        support: (V,) number of scans that agree on each vertex, or None.
         stdev: (V,) estimated standard deviation of each vertex along its normal, in the unit of
-            the mesh, NaN where no scan stands behind it; or None.
-        filled: (V,) whether no scan stands behind a vertex: it closes a hole; or None.
+            the mesh, NaN where no scan measured it; or None.
+        filled: (V,) vertices that no scan measured: they close holes; or None.
 
     Raises:
         ValueError: If the shapes do not fit, or a face names no vertex.

@@ -118,7 +118,7 @@ class PreparedScan:
 
     @property
     def work_hash(self) -> str:
-        """Of the scan and of what was left out of it: what work on it is kept by."""
+        """Hash of the scan and of whether its support was left out: the key of cached work."""
         return f"{self.content_hash}{' without support' * self.is_without_support}"
 
     @property

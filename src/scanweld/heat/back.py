@@ -6,7 +6,7 @@ from scanweld.geometry.arrays import BoolArray, IntArray
 from scanweld.heat.front import FrontMesh
 
 _LARGEST = 8
-"""The largest squares, in cells of the front."""
+"""Edge of the largest squares, in cells of the front; a power of two."""
 
 
 def coarse_faces(front: FrontMesh, border: IntArray) -> IntArray:

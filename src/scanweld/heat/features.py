@@ -17,7 +17,7 @@ from scanweld.heat.signature import diffusion_times, heat_signature, sun_times
 from scanweld.heat.surface import heat_surface
 
 _VERTICES_PER_MODE = 2
-"""A front of fewer vertices than this many times the modes does not resolve them."""
+"""Least number of front vertices for each eigenmode: fewer do not resolve the modes."""
 
 logger = logging.getLogger(__name__)
 
@@ -64,11 +64,15 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
     """
     front = thin_front(scan.image, config.max_front_vertices, bridged=config.jumps == "bridged")
     if len(front.points) < _VERTICES_PER_MODE * config.num_modes:
-        logger.info("%s: no heat keypoints, only %d vertices", scan.name, len(front.points))
+        logger.info(
+            "%s: no heat keypoints, because %d vertices are too few for the modes",
+            scan.name,
+            len(front.points),
+        )
         return _no_features(config.num_times)
     mesh = heat_surface(front, scan.image.camera, scan.diameter, config.surface)
     if len(mesh.vertices) - len(mesh.cold) <= config.num_modes:
-        logger.info("%s: no heat keypoints, too few vertices off the rims", scan.name)
+        logger.info("%s: no heat keypoints, because too few vertices are off the rims", scan.name)
         return _no_features(config.num_times)
     vertices = (mesh.vertices - mesh.vertices.mean(axis=0)) / scan.diameter
     try:
@@ -78,7 +82,7 @@ def describe(scan: PreparedScan, config: HeatConfig) -> Features:
         return _no_features(config.num_times)
     times = _times(eigenvalues, config)
     signature = heat_signature(eigenvalues, functions, times)
-    # Heat on walls and back says where the sensor stood: only the front's own maxima are taken.
+    # Heat on walls and back depends on where the sensor stood: only the front's maxima are taken.
     surface = signature[: mesh.num_front]
     maxima = persistent_maxima(
         surface, front.points / scan.diameter, front.faces, config.group_diameters

@@ -9,9 +9,9 @@ from scipy.spatial import KDTree
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 _MIN_TIMES = 2
-"""A maximum must be found again at so many successive times."""
+"""Successive diffusion times at which a maximum must be found."""
 _ALIKE = 0.5
-"""Signatures (log) are alike below this root mean square difference."""
+"""Root mean square difference of two log signatures below which they are alike."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ from scanweld.geometry.arrays import FloatArray
 _CONSTANT = 1e-6
 """Eigenvalues below this, for a mesh of unit size, belong to functions constant on each piece."""
 _LEAST_HEAT = 1e-9
-"""Less heat than this is none: a piece too small to have a mode would show rounding errors."""
+"""Least heat, before the logarithm: pieces too small for a mode would show rounding errors."""
 
 
 def diffusion_times(eigenvalues: FloatArray, num_times: int, longest: float) -> FloatArray:

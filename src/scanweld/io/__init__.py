@@ -2,7 +2,7 @@
 
 from scanweld.io.atomic import write_whole
 from scanweld.io.collect import ScanFile, collect
-from scanweld.io.names import natural_key, printable
+from scanweld.io.names import natural_key, path_from, printable
 from scanweld.io.ply_write import write_mesh_ply, write_scan_ply
 from scanweld.io.poses import PoseSet, read_poses, write_poses
 from scanweld.io.read import read_mesh, read_scan
@@ -12,6 +12,7 @@ __all__ = [
     "ScanFile",
     "collect",
     "natural_key",
+    "path_from",
     "printable",
     "read_mesh",
     "read_poses",

@@ -2,6 +2,7 @@
 
 import os
 import re
+from pathlib import Path
 
 
 def natural_key(text: str) -> tuple[list[str | int], str]:
@@ -13,3 +14,12 @@ def natural_key(text: str) -> tuple[list[str | int], str]:
 def printable(text: str) -> str:
     r"""The text with bytes of a file's name that are not UTF-8 spelled out, as ``\xff``."""
     return os.fsencode(text).decode("utf-8", "backslashreplace")
+
+
+def path_from(folder: Path, path: Path) -> str:
+    """The path as seen from a folder, with slashes; the whole path where it is on another drive."""
+    whole = os.path.abspath(path)
+    try:
+        return Path(os.path.relpath(whole, folder)).as_posix()
+    except ValueError:  # Windows, another drive
+        return Path(whole).as_posix()

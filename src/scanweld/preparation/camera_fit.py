@@ -10,9 +10,9 @@ from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, nearest_rotation, rotation_exp
 
 MAX_RMS_PIXELS = 0.25
-"""A camera explains a grid if it puts the points this close to their cells."""
+"""Root mean square distance between projected points and their cells up to which a camera fits."""
 MIN_RELIEF = 1e-3
-"""Points thinner than this, relative to their extent, count as flat."""
+"""Thickness of the points, as a share of their extent, below which they count as flat."""
 MIN_EIGENVALUE_RATIO = 100.0
 """Second smallest over smallest eigenvalue of a homogeneous fit that is well determined."""
 NUM_STEPS = 10

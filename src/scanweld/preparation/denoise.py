@@ -13,21 +13,22 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 
 CLEAN_NOISE_PIXELS = 0.15
-"""Noise of depth, in footprints, below which an image is not smoothed: normals bear it."""
+"""Noise of depth, in footprints, below which an image is not smoothed: its normals are good."""
 MIN_BRIDGES = 2
 """An empty pixel with so many pairs of opposite neighbours, of four, is a pinhole."""
 MAX_PINHOLE_SHARE = 0.05
-"""Pinholes, as a share of the surface's pixels, up to which a scan is a good one."""
+"""Pinholes, as a share of the surface's pixels, up to which a scan needs no filling."""
 MAX_RADIUS = 4
+"""Largest radius of a neighbourhood, in pixels."""
 NORMAL_ERROR = 0.05
 """Slope error of the fitted planes, by noise, that the radius of a neighbourhood aims at."""
 NUM_ROUNDS = 4
 """Rounds of reweighting of a plane, from steps that a surface may have to the noise alone."""
 NOISE_REACH = 2.5
 """Depths farther than so many standard deviations from a plane hardly belong to it."""
-MIN_SUPPORT = 0.25
-"""Share of a neighbourhood that must lie on its plane: a corner's is a quarter."""
-MIN_FILL_SUPPORT = 0.4
+MIN_PLANE_SHARE = 0.25
+"""Share of a neighbourhood that must lie on its plane; at a corner it is a quarter."""
+MIN_FILL_SHARE = 0.4
 """The same for a pixel that has no depth of its own, or one off the plane,"""
 MAX_FILL_OFFSET = 0.3
 """whose neighbours must lie all around it: their mean is no farther off, in radii."""
@@ -108,20 +109,20 @@ def _fit_planes(
     for row in range(height):
         for column in range(width):
             own = depth[row, column]
-            value, support, offset = np.nan, 0.0, 1.0
+            value, share, offset = np.nan, 0.0, 1.0
             if np.isfinite(own):
-                value, support, offset = _plane_at(
+                value, share, offset = _plane_at(
                     depth, row, column, own, radius, first_reach, last_reach
                 )
-            is_own = support >= MIN_SUPPORT and abs(value - own) <= 3.0 * last_reach
+            is_own = share >= MIN_PLANE_SHARE and abs(value - own) <= 3.0 * last_reach
             if not is_own:
                 start = _common_depth(depth, row, column, radius, first_reach)
                 if np.isnan(start):
                     continue
-                value, support, offset = _plane_at(
+                value, share, offset = _plane_at(
                     depth, row, column, start, radius, first_reach, last_reach
                 )
-                if support < MIN_FILL_SUPPORT or offset > MAX_FILL_OFFSET:
+                if share < MIN_FILL_SHARE or offset > MAX_FILL_OFFSET:
                     continue
             fitted[row, column] = value
     return fitted

@@ -13,11 +13,13 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.preparation.camera_fit import affine_fit, homogeneous_fit
 
 MIN_GAIN = 2.0
-"""An axis may fan out if that explains it this many times better than parallel sight."""
+"""Factor by which a fan of rays must fit an axis better than parallel rays to be accepted."""
 MIN_FAN = 3.0
-"""How far fanning over the points' depth moves them across the cells, over the fit's residual."""
+"""Least shift across the cells that the fan causes over the points' depth, in residuals of the fit:
+below it the fan does not show the sensor's side."""
 MIN_OBLIQUE_DEG = 10.0
-"""Lines of sight nearer to square with the travel than this are taken as they are."""
+"""Angle between a line of sight and the direction square to the travel above which the line is
+oblique."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -34,17 +34,18 @@ MIN_WIDTH = 1e-6
 MAX_FIT_CELLS = 10_000
 """Grid cells that a camera is fitted to."""
 SAME_RMS_PIXELS = 0.02
-"""Below this residual an orthographic camera is as good as any."""
+"""Residual below which an orthographic camera is accepted without trying a pinhole."""
 SAME_RMS_RATIO = 1.5
-"""A pinhole must be this many times better than an orthographic camera to be preferred."""
+"""Factor by which a pinhole must fit better than an orthographic camera to be preferred."""
 MAX_MISFIT = 0.1
-"""A grid whose cells depend on the points less simply than this is none of a single viewpoint."""
+"""Residual of the line of sight's fit, as a share of the grid, above which the grid does not belong
+to a single viewpoint."""
 MAX_LAYERED = 0.25
 """Share of points behind others above which they cannot have been seen from one viewpoint."""
 IMAGE_SPACINGS = 2.0
-"""Pixel of the depth image on which the side of points without a grid is judged."""
+"""Size of the pixels, in point spacings, of the depth image from which the side is found."""
 STAND_OFF_DIAMETERS = 2.0
-"""How far before the object's centroid a sensor is put of which only the direction is known."""
+"""Distance from the object's centroid of a sensor of which only the direction is known."""
 
 OBLIQUE_NOTE = (
     "the grid looks obliquely to the scanner's travel, as a camera beside a sheet of light does; "
@@ -140,7 +141,7 @@ def _from_grid(scan: RangeScan) -> RangeScan | None:
         return _with_camera(scan, fit, *notes)
     if sight.is_oblique:
         notes = (OBLIQUE_NOTE, *notes)
-    note = "no frame camera explains the grid; its line of sight was fitted"
+    note = "no pinhole or orthographic camera fits the grid; its line of sight was fitted"
     return _with_direction(scan, axis, sight.right, Viewpoint.FITTED, note, *notes)
 
 
@@ -165,7 +166,7 @@ def _from_surface(scan: RangeScan) -> RangeScan:
     axis, notes = _sided(scan, axis, depth_image(points, axis, right, cell), cell)
     if layered > MAX_LAYERED:
         notes = (COMPLETE_NOTE, *notes)
-    note = "the file does not tell the viewpoint; it was estimated from the surface"
+    note = "the file does not give the viewpoint; it was estimated from the surface"
     return _with_direction(scan, axis, right, Viewpoint.ESTIMATED, note, *notes)
 
 

@@ -1,8 +1,8 @@
 """On which side of the surface the sensor stood, where the line of sight is known.
 
-Each cue says how strongly it is for the sensor looking along +axis (1) or along -axis (-1).
-The first one, in the order below, that is strong enough decides; the others may contradict it,
-which is reported. If none is strong, the strongest decides and the side is called a guess.
+Each cue is a number from -1 (the sensor looks along -axis) to 1 (along +axis). The first one, in
+the order below, that is strong enough decides; if strong ones contradict it, this is reported. If
+none is strong, the strongest decides and the side is reported as uncertain.
 
 1. winding: counter-clockwise faces turn their front to the sensor.
 2. normals of the file turn towards the sensor.
@@ -34,7 +34,7 @@ MAX_SLOPE = 4.0
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Side:
-    """Where the sensor looks: along +axis (sign 1) or -axis (sign -1), and how we know.
+    """Where the sensor looks: along +axis (sign 1) or -axis (sign -1), and by which cue.
 
     Attributes:
         sign: 1 or -1.
@@ -51,7 +51,10 @@ class Side:
     def note(self) -> str | None:
         """What to tell the user about it, or None if nothing is in doubt."""
         if self.strength < STRONG:
-            return f"the side on which the sensor stood is a guess (by {self.cue})"
+            return (
+                f"the side from which the sensor looked is a guess (by {self.cue}); if the "
+                "scan comes out inside out, give its normals or its sensor pose"
+            )
         if self.contradicts:
             other = " and ".join(self.contradicts)
             return f"the sensor's side is taken from {self.cue}, which {other} contradict"
@@ -84,7 +87,7 @@ def fall_off(depth: FloatArray, pixel: float) -> float:
     """How far depth (H, W) grows towards the silhouette: 1 everywhere, -1 if it shrinks everywhere.
 
     Pixels on the outer rim are compared with those a few pixels further inside. Jumps and holes
-    have no say, slopes count up to 1.
+    do not count, slopes count up to 1.
     """
     stride = max(1, -(-max(depth.shape) // MAX_PIXELS))
     margin = 2 * RIM_PIXELS

@@ -7,10 +7,12 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.scan import RangeScan
 
 MIN_NEIGHBOURS = 4
+"""A point with fewer neighbours than this is a stray."""
 REACH_SPACINGS = 3.8
-"""A point with fewer neighbours than that, within so many spacings, is a stray."""
+"""Distance within which points are neighbours, in point spacings."""
 DEPTH_REACH = 2.0
-"""How many times farther neighbours may be along the line of sight: surfaces seen edge-on."""
+"""Factor by which neighbours may be farther away along the line of sight: there, points on surfaces
+seen edge-on are spaced more widely."""
 
 
 def without_strays(scan: RangeScan, points: FloatArray, spacing: float) -> RangeScan:

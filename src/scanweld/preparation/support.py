@@ -1,7 +1,7 @@
 """The table or turntable that an object stands on: a plane around it, with the object above it.
 
-A plane says nothing of how an object is turned on it, and it may be another one once the object
-has been turned over. So it is left out before scans are registered.
+A plane does not show how the object is turned on it, and after the object has been laid on another
+side the plane has moved relative to it. So the plane is removed before scans are registered.
 """
 
 import numpy as np
@@ -15,17 +15,19 @@ NUM_DRAWS = 300
 NUM_TRIED = 2000
 """Points that they are tried on, at most."""
 FLAT_SPACINGS = 1.5
-"""Points this near a plane lie in it, in spacings of the points,"""
+"""Distance from a plane, in point spacings, up to which a point lies in it."""
 MIN_SHARE = 0.15
-"""Share of the points that the plane holds, at least."""
+"""Least share of the points that lie in the plane or below it."""
 MIN_ABOVE, MAX_BELOW = 0.03, 0.3
-"""Least share of the points that stand above it; most below, as a share of these."""
+"""Least share of all points that lie above the plane; most below it, as a share of those above."""
 MIN_HEIGHT = 0.15
-"""What stands on it is at least so high, in its own diameters: reliefs are of one piece."""
+"""Least height of what stands on the plane, in its own diameters: a lower one is a relief, of one
+piece with the plane."""
 NUM_SECTORS, MIN_SECTORS = 12, 8
-"""Sectors around the object, and in how many of them, at least, the plane is seen beyond it."""
+"""Sectors around the object, and the number of them in which the plane must be seen."""
 REACH = 0.6
-"""It is, where it reaches so far, as a share of how far the object does there."""
+"""Distance from the object's middle to which the plane must reach in a sector to count as seen
+there, as a share of the object's own reach."""
 
 
 def find_support(points: FloatArray, spacing: float) -> BoolArray | None:

@@ -9,9 +9,9 @@ from scanweld.geometry.camera import Camera
 from scanweld.geometry.scan import RangeScan
 
 CELLS_PER_POINT = 8
-"""Cells of a range grid for each of its points, at most: empty ones take room as well."""
+"""Cells of a range grid for each of its points, at most: empty cells take memory as well."""
 SLACK = 1.02
-"""Cells of space grow at least by this until few enough are left."""
+"""Factor by which the cubes grow, at least, until few enough are left."""
 
 
 def thinned(scan: RangeScan, max_points: int) -> RangeScan:
@@ -27,8 +27,8 @@ def thinned(scan: RangeScan, max_points: int) -> RangeScan:
         return scan
     grid = None if scan.grid is None or not (scan.grid >= 0).any() else scan.grid
     smaller, how = _in_cubes(scan, max_points) if grid is None else _strided(scan, grid, max_points)
-    told = f"thinned from {len(scan.points)} to {len(smaller.points)} points to save memory, {how}"
-    return replace(smaller, notes=(*scan.notes, told))
+    note = f"thinned from {len(scan.points)} to {len(smaller.points)} points to save memory, {how}"
+    return replace(smaller, notes=(*scan.notes, note))
 
 
 def _strided(scan: RangeScan, grid: IntArray, max_points: int) -> tuple[RangeScan, str]:

@@ -8,31 +8,35 @@ least steep on average, by a mean over all that are nearly as good as the best.
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.directions import golden_spiral
 from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.resolution import point_spacing
 
 MAX_POINTS = 20_000
-"""Points that the line of sight is sought with; the search begins with fewer."""
+"""Points of a scan that the last step of the search uses, at most,"""
 FIRST_POINTS = 6_000
+"""and those that the first steps use."""
 NUM_COARSE = 300
-"""Directions tried over the half sphere (5 deg apart), and around the best ones (2 deg)."""
+"""Directions on the half sphere that are tried first, about 8 deg apart."""
 NUM_FINE = 2_000
+"""Directions on the half sphere of which those near the best ones are tried, about 3 deg apart."""
 NUM_STARTS = 6
-"""Distinct coarse directions that are looked at more closely."""
+"""Distinct coarse directions around which fine ones are tried."""
 START_DEG = 10.0
+"""Angle within which fine directions are tried around each of these,"""
 CAP_DEG = 25.0
-"""Half angles of the caps of fine directions around a start and around the best of all."""
+"""and within which they are averaged around the best of all."""
 CELL_SPACINGS = 1.5
 """Cell of the raster, in spacings of the points."""
 LAYERED_CELLS = 1.5
 """Standard deviation of depth within a cell, in cells, above which it holds several layers."""
 MAX_DEVIATION = 4.0
+"""Most that a cell's deviation of depth counts, in cells."""
 STEEPNESS_WEIGHT = 0.1
-"""Weight of the mean deviation of depth, which stands for steepness, beside the layered share."""
+"""Weight of the mean deviation of depth, a measure of steepness, beside the share of layered
+cells."""
 NEARLY = 0.005
-"""Excess of the cost by which a direction's weight falls by 1/e."""
+"""Excess of the cost over the least at which a direction's weight has fallen to 1/e."""
 
 
 def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -106,8 +110,11 @@ def _principal_frame(points: FloatArray) -> FloatArray:
 
 
 def _half_sphere(count: int) -> FloatArray:
-    """Unit directions (count, 3) with z > 0, evenly spread."""
-    return golden_spiral((np.arange(count) + 0.5) / count)
+    """Unit directions (count, 3) with z > 0, evenly spread on a spiral of golden angles."""
+    k = np.arange(count) + 0.5
+    z, turn = k / count, k * np.pi * (1 + np.sqrt(5))
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
 
 
 def _cap(axes: FloatArray, centre: FloatArray, degrees: float) -> FloatArray:

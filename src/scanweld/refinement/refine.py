@@ -18,15 +18,15 @@ from scanweld.refinement.surface_terms import SurfaceSource, surface_matches, su
 logger = logging.getLogger(__name__)
 
 NUM_POINTS = 4000
-"""Surface points of a scan that take part."""
+"""Surface points of a scan that are matched."""
 MIN_MATCHES = 20
-"""A direction of a pair with fewer matches than this has no say."""
+"""A pair takes part in each direction in which it has at least so many matches."""
 SURFACE_NOISE_DIAMETERS = 1e-7
 """Least spread of surface residuals: exact data have none."""
 MAX_STEP_DIAMETERS = 0.1
-"""A scan moves no farther in a round: matches say nothing about longer steps."""
+"""Most that a scan moves in a round: matches hold for short steps only."""
 NUM_CONTOUR_ROUNDS = 4
-"""Contours take part in the last rounds: they cost most, and are sharp at nearly right poses."""
+"""Last rounds, in which contours take part: they cost most, and need nearly right poses."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

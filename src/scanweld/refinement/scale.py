@@ -18,9 +18,9 @@ from scanweld.refinement.refine import (
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
 
 MATCH_DIAMETERS = 0.012
-"""Farthest match: a scale that is off by a percent moves surfaces by half of that."""
+"""Farthest match: a scale error of one percent moves a surface by up to half a percent."""
 CORRELATED_MATCHES = 30.0
-"""Neighbouring matches err alike: so many are worth one."""
+"""Matches that count as one independent match: neighbouring ones have errors in common."""
 NUM_ROUNDS = 4
 """Steps of least squares, each with new matches."""
 MIN_ERROR = 0.004
@@ -29,7 +29,7 @@ MIN_ERROR = 0.004
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScaleEstimate:
-    """How many times too large a scan is, beside the usual one of its component.
+    """How many times too large a scan is, compared with the other scans of its component.
 
     Attributes:
         factor: 1 for a scan in the unit of the others.
@@ -41,18 +41,21 @@ class ScaleEstimate:
 
     @property
     def is_off(self) -> bool:
-        """Whether the scan is surely in another unit than the others, by however little."""
+        """Whether the scale differs from the others' by more than its error."""
         error = abs(self.factor - 1.0)
         return error > max(MIN_ERROR, SIGNIFICANT_SIGMAS * self.deviation)
 
     def words(self) -> str:
-        """What is wrong with the scan's scale."""
+        """What is wrong with the scan's scale, and what to do."""
         larger = (
             f"{self.factor:.3f} times too large"
             if self.factor > 1
             else (f"{1 / self.factor:.3f} times too small")
         )
-        return f"its scale is off: {larger} beside the other scans (± {self.deviation:.3f})"
+        return (
+            f"its scale is off: {larger} compared with the other scans (± {self.deviation:.3f}); "
+            "check its unit and the sensor's calibration"
+        )
 
 
 def estimate_scales(

@@ -11,9 +11,9 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind, PreparedScan
 
 MIN_COSINE = 0.2
-"""Pixels seen at a more grazing angle than this (cosine) take no part: range is poor there."""
+"""Cosine of incidence below which pixels are not matched: range is poor there."""
 NUM_WALKS = 3
-"""Projections of the foot point; each brings it closer to the true closest point."""
+"""Projections of the point's foot on the plane; each brings it closer to the closest point."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -1,40 +1,89 @@
-"""A place for compiled kernels where neither the package nor the user's cache can be written.
+"""Where compiled kernels are kept: in a folder of their own for each state of their source.
 
-Numba keeps what it compiled beside the source, else in the user's cache folder. Where it can write
-to neither (a service's account, a read-only container), it fails on import. Importing this module
-before any that holds a kernel puts the cache into a temporary folder then.
+Numba notices that a kernel's own file has changed, but not that a kernel or a constant of another
+file has, though that is compiled into it. So the folder's name holds a digest of all these files.
+This module must be imported before any that defines a kernel.
 """
 
 import atexit
+import contextlib
 import logging
+import os
 import shutil
 import tempfile
+import time
+from pathlib import Path
 
-import numba
 from numba.core import config
+from platformdirs import user_cache_path
+
+from scanweld.work.source import PACKAGE, kernel_digest
 
 logger = logging.getLogger(__name__)
 
+PREFIX = "kernels-"
+NUM_KEPT = 3
+"""Folders of other states of the source that are kept, the last used ones,"""
+KEPT_SECONDS = 24 * 3600
+"""and all that were used so recently: a program that still runs may need them."""
 
-def provide_cache() -> str | None:
-    """Make sure that Numba can keep kernels; returns the temporary folder if one was needed."""
+
+def provide_cache(chosen: str = "") -> Path:
+    """Tell Numba where to keep compiled kernels.
+
+    Args:
+        chosen: A folder that users have chosen. If there is none, or it cannot be written, kernels
+            are kept in the user's cache folder, else in the package's own, else in a temporary
+            folder for as long as the program runs.
+
+    Returns:
+        The folder.
+    """
+    name = PREFIX + kernel_digest()[:16]
+    parents = [user_cache_path("scanweld", appauthor=False), PACKAGE / "__pycache__"]
+    for parent in [Path(chosen) / "scanweld", *parents] if chosen else parents:
+        folder = parent / name
+        if _is_writable(folder):
+            _prune(folder)
+            break
+    else:
+        folder = _temporary_folder()
+    config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # Numba makes it at run time
+    return folder
+
+
+def _is_writable(folder: Path) -> bool:
+    """Whether files can be made in a folder, which is made if need be, and marked as used."""
     try:
-        numba.njit(cache=True)(_nothing)
-    except RuntimeError:
-        # Not a fixed name under /tmp: others could put code there that would then be run.
-        folder = tempfile.mkdtemp(prefix="scanweld-kernels-")
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        config.CACHE_DIR = folder  # type: ignore[attr-defined]  # Numba makes it at run time
-        logger.warning(
-            "no folder to keep compiled code in, so it is compiled anew in each run; "
-            "set NUMBA_CACHE_DIR to a folder that can be written"
-        )
-        return folder
-    return None
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+        os.utime(folder)
+    except OSError:
+        return False
+    return True
 
 
-def _nothing() -> None:
-    """A function to try the cache with."""
+def _prune(folder: Path) -> None:
+    """Remove the folders of earlier states of the source that have not been used for long."""
+    others = []
+    for other in folder.parent.glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError):  # another process may be pruning too
+            if other != folder:
+                others.append((other.stat().st_mtime, other))
+    for used, other in sorted(others)[:-NUM_KEPT]:
+        if time.time() - used > KEPT_SECONDS:
+            shutil.rmtree(other, ignore_errors=True)
 
 
-provide_cache()
+def _temporary_folder() -> Path:
+    # Not a fixed name under /tmp: others could put code there that would then be run.
+    folder = Path(tempfile.mkdtemp(prefix="scanweld-kernels-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    logger.warning(
+        "no folder can be written to keep compiled code in, so it is compiled anew in each run; "
+        "set NUMBA_CACHE_DIR to a folder that can be written"
+    )
+    return folder
+
+
+provide_cache(config.CACHE_DIR)  # type: ignore[attr-defined]

@@ -2,18 +2,22 @@
 
 import hashlib
 import logging
-import resource
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from typing import TypeVar
 
 from scanweld.config import Section
 from scanweld.work.progress import Cache, Progress, StageAdvanced, telling
+from scanweld.work.source import code_digest
 from scanweld.work.threads import map_in_order
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 logger = logging.getLogger(__name__)
 
@@ -27,7 +31,8 @@ class StageReport:
 
     Attributes:
         seconds: Wall time.
-        peak_mb: Peak resident memory of the process at the stage's end.
+        peak_mb: Peak resident memory of the process at the stage's end; 0 where the system does not
+            tell.
         counts: What was counted, such as {"pairs": 45, "accepted": 25}.
     """
 
@@ -102,13 +107,15 @@ class Stages:
 
 
 def work_key(stage: str, *parts: str | float | Section) -> str:
-    """A hex key of a piece of work: the stage, its input's hashes, its settings, our version."""
-    told = [version("scanweld"), stage]
+    """A hex key of a piece of work: the stage, its input's hashes, its settings, and our code."""
+    told = [code_digest(), stage]
     told += [part.model_dump_json() if isinstance(part, Section) else repr(part) for part in parts]
     return hashlib.sha256("\n".join(told).encode()).hexdigest()
 
 
 def peak_memory_mb() -> float:
-    """Peak resident memory of this process so far."""
+    """Peak resident memory of this process so far; 0 where the system does not tell."""
+    if resource is None:
+        return 0.0
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (2**20 if sys.platform == "darwin" else 2**10)

@@ -1,4 +1,6 @@
-"""The calibration command: objects that can be scanned, fits that find what is known, and a run."""
+"""The calibration: objects that can be scanned, fits that find what is known, what is told."""
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -6,46 +8,43 @@ import pytest
 from benchmarks.calibration.collect import NUM_SETS, Sets
 from benchmarks.calibration.fit import count_frequencies, fit, held_out_probabilities, make_examples
 from benchmarks.calibration.learn import learn
-from benchmarks.calibration.page import calibration
-from benchmarks.calibration.report import measures
+from benchmarks.calibration.report import calibration_told, measures
 from benchmarks.calibration.scenes import OTHER, make_set
-from benchmarks.calibration.solids import ODDS, SOLIDS, make_solid
-from benchmarks.judging.measures import calibration_error
-from benchmarks.judging.rivals import Rivals
-from benchmarks.judging.table import Runs
-from benchmarks.paper.study import Record
-from benchmarks.paper.success import auc
-from benchmarks.virtual.strangers import LIKE
+from benchmarks.calibration.solids import SOLIDS
+from benchmarks.judging.other_tools import OtherTools
+from benchmarks.judging.runs import Runs
+from benchmarks.kept import Record
+from benchmarks.scores import Stated
+from benchmarks.seeds import spent_among
+from benchmarks.virtual.bodies import Body
+from benchmarks.virtual.disturbances import LIKE
 from scanweld.confidence.model import read_calibration
 from scanweld.geometry.arrays import BoolArray, FloatArray
 
 
-@pytest.mark.parametrize("family", SOLIDS)
-def test_solids_face_outwards_and_differ_by_seed(family: str):
-    a, b = (make_solid(family, seed).mesh for seed in (0, 1))
+@pytest.mark.parametrize("make", SOLIDS, ids=lambda make: make.__name__)
+def test_solids_face_outwards_and_differ_by_seed(make: Callable[[np.random.Generator], Body]):
+    a, b, again = (make(np.random.default_rng([seed, 7])).mesh for seed in (0, 1, 0))
     corners = a.vertices[a.faces]
     volume = np.einsum("nk,nk->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
     assert volume > 1000
     assert a.vertices.shape != b.vertices.shape or not np.allclose(a.vertices, b.vertices)
-    assert make_solid(family, 0).mesh.vertices.tobytes() == a.vertices.tobytes()
-
-
-def test_each_family_has_its_odds():
-    assert len(ODDS) == len(SOLIDS) and sum(ODDS) == pytest.approx(1)
+    assert again.vertices.tobytes() == a.vertices.tobytes()
 
 
 def test_scenes_repeat_themselves():
     a, b = make_set(3), make_set(3)
     assert [scan.points.tobytes() for scan in a.scans] == [s.points.tobytes() for s in b.scans]
-    assert 3 <= len(a.scans) <= 6
+    assert 3 <= len(a.scans) <= 6 and sum(SOLIDS.values()) == pytest.approx(1)
 
 
-def test_calibration_and_trust_have_no_seed_in_common():
+def test_trust_has_no_seed_that_decided_something():
     learned = {unit["seed"] for unit in Sets().units(False)}
-    others = {seed + OTHER for seed in learned}
-    asked = {unit["seed"] for unit in [*Runs().units(False), *Rivals().units(False)]}
-    assert len(learned) == NUM_SETS and not asked & (learned | others)
-    assert not {seed + LIKE for seed in asked} & (learned | others)
+    both = learned | {seed + OTHER for seed in learned}
+    asked = {unit["seed"] for unit in [*Runs().units(False), *OtherTools().units(False)]}
+    asked |= {seed + LIKE for seed in asked}
+    assert len(learned) == NUM_SETS and not spent_among(asked)
+    assert all(spent_among([seed]) for seed in both)
 
 
 def known(count: int, seed: int) -> tuple[list[dict[str, float]], FloatArray, BoolArray]:
@@ -65,7 +64,7 @@ def test_the_fit_finds_probabilities_that_are_known():
     # What tells the wrong way cannot be used: a model must not doubt what looks better.
     assert np.ptp(model.curves["against"].values) < 0.3
     assert np.ptp(model.curves["idle"].values) < 0.5 < 3 < np.ptp(model.curves["tells"].values)
-    assert calibration_error(said.tolist(), came.tolist()) < 0.03
+    assert Stated(said, came).calibration_error() < 0.03
     assert np.corrcoef(said, probability)[0, 1] > 0.9
 
 
@@ -76,7 +75,7 @@ def test_held_out_probabilities_know_nothing_of_their_set():
     is_right = (rng.random(40) < 0.5)[groups]
     rows = [{"number": float(g), "noise": float(rng.normal())} for g in groups]
     said = held_out_probabilities(make_examples(rows, is_right.tolist(), groups.tolist()))
-    assert auc(said.tolist(), is_right.tolist()) < 0.65
+    assert Stated(said, is_right).auc < 0.65
 
 
 def test_few_examples_do_not_make_certain():
@@ -94,11 +93,7 @@ def made_record(seed: int) -> Record:
     is_right = bool(rng.random() < 0.6)
     pairs = [
         {
-            "i": i,
-            "j": j,
-            "kind": "good",
-            "observability": 1.0,
-            "accepted": k < 2,
+            **{"i": i, "j": j, "kind": "good", "observability": 1.0, "accepted": k < 2},
             "grounds": {"agree": float(rng.normal(2.0 * (k < 2 and is_right))), "support": 0.0},
             "right": bool(k < 2 and is_right),
         }
@@ -106,9 +101,7 @@ def made_record(seed: int) -> Record:
     ]
     scans = [
         {
-            "name": name,
-            "component": 0,
-            "reference": name == "b",
+            **{"name": name, "component": 0, "reference": name == "b"},
             "grounds": {
                 "agree": float(rng.normal(2.0 * is_right)),
                 **{"margin": 1.0, "observability": -1.0, "link": 0.0},
@@ -125,10 +118,10 @@ def test_scans_learn_from_the_confidence_of_their_pairs():
     assert len(learned.pairs) == len(learned.scans) == 450
     links = learned.scans.grounds[:, learned.scans.names.index("link")]
     assert links[learned.scans.is_right].mean() > links[~learned.scans.is_right].mean() + 0.3
-    assert auc(learned.pair_confidence.tolist(), learned.pairs.is_right.tolist()) > 0.85
-    assert auc(learned.scan_confidence.tolist(), learned.scans.is_right.tolist()) > 0.9
+    assert learned.stated_pairs.auc > 0.85
+    assert learned.stated_scans.auc > 0.9
     again = read_calibration(learned.calibration.to_json())
     assert again.made["sets"] == 150 and again.made["command"] == "the command"
-    text = calibration(measures(learned))
+    text = calibration_told(measures(learned))
     assert "`the command`" in text and "150 sets" in text
     assert "Of the pairs have a confidence from 0.5 on" in text

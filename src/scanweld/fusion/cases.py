@@ -1,6 +1,4 @@
-"""Marching cubes: triangles where the values on a grid change their sign.
-
-The 256 cases are derived rather than listed.
+"""The 256 cases of marching cubes, derived rather than listed.
 
 Corner c of a cell has the offsets (c & 1, c >> 1 & 1, c >> 2 & 1); edge 4 a + k runs along axis a.
 On an ambiguous face the two inner corners are cut off one by one, so that neighbours agree; no
@@ -10,52 +8,10 @@ diagonal of a polygon lies in a face of the cell, so that no edge of the mesh ha
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import IntArray
 
 Triangle = tuple[int, int, int]
-
-
-def isosurface(field: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The zero surface of a dense grid.
-
-    Args:
-        field: (X, Y, Z) values, negative inside; none is zero.
-
-    Returns:
-        Vertices (V, 3) in steps of the grid, by linear interpolation, and faces (F, 3),
-        counter-clockwise from outside.
-    """
-    inside = field < 0
-    x, y, z = (n - 1 for n in field.shape)
-    corners = [inside[i : i + x, j : j + y, k : k + z] for i, j, k in corner_offsets()]
-    cells = np.argwhere(np.any(corners, axis=0) & ~np.all(corners, axis=0))
-    values = field[tuple(np.moveaxis(cells[:, None] + corner_offsets(), -1, 0))]
-    nodes, axis, ends = crossed_edges(cells, values)
-    key = 3 * np.ravel_multi_index(tuple(nodes.T), field.shape) + axis
-    _, first, faces = np.unique(key, return_index=True, return_inverse=True)
-    step = ends[first, 0] / (ends[first, 0] - ends[first, 1])
-    vertices = nodes[first] + step[:, None] * np.eye(3)[axis[first]]
-    return vertices, faces.reshape(-1, 3).astype(np.int64)
-
-
-def crossed_edges(cells: IntArray, values: NDArray) -> tuple[IntArray, IntArray, NDArray]:
-    """The edges that the surface crosses in cells of a grid, three a triangle.
-
-    Args:
-        cells: (N, 3) lowest nodes of the cells.
-        values: (N, 8) at their corners, in the order of ``corner_offsets``; negative inside.
-
-    Returns:
-        The lower node (3 T, 3) of each edge, its axis (3 T,), and the values (3 T, 2) at both ends.
-    """
-    case = np.packbits(values < 0, axis=1, bitorder="little")[:, 0]
-    edges = triangle_table().reshape(256, -1)[case]
-    row, column = np.nonzero(edges >= 0)
-    edge = edges[row, column]
-    ends = edge_corners()[edge]
-    return cells[row] + corner_offsets()[ends[:, 0]], edge // 4, values[row[:, None], ends]
 
 
 def corner_offsets() -> IntArray:

@@ -1,4 +1,4 @@
-"""How well each vertex of a fused mesh is known: the scans behind it, and their scatter."""
+"""How well each vertex of a fused mesh is known: the scans that agree on it, and their scatter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,14 +13,13 @@ from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS
 from scanweld.geometry.prepared import MIN_COSINE
 
 _PRIOR_SCANS = 4.0
-"""The noise of the scans as a whole counts for as many scans as these; the local scatter besides.
-
-With two or three scans the scatter alone would say next to nothing."""
+"""The scans' overall noise counts like the scatter of so many scans at a vertex: of two or three
+scans alone the scatter would be known too poorly."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Support:
-    """What stands behind V vertices.
+class Agreement:
+    """What the scans say of V vertices.
 
     Attributes:
         count: (V,) number of scans whose surface lies there.
@@ -31,16 +30,16 @@ class Support:
     stdev: FloatArray
 
 
-def measure_support(
+def measure_agreement(
     images: Sequence[PosedImage], vertices: FloatArray, normals: FloatArray, voxel: float
-) -> Support:
-    """Hold vertices against the scans that they were fused from.
+) -> Agreement:
+    """Compare vertices with the scans that they were fused from.
 
-    The variance of a weighted mean follows from the scans' noise; how far the scans really lie
-    apart at the vertex corrects it, the more the more of them there are.
+    A vertex is a weighted mean of the scans' surfaces. Its variance follows from the scans' noise,
+    corrected by the scatter of these surfaces at the vertex: the more scans, the stronger.
 
     Args:
-        images: With their noise.
+        images: Posed scans whose noise is known.
         vertices: (V, 3), world frame.
         normals: (V, 3) unit, pointing out.
         voxel: Edge of a voxel.
@@ -50,17 +49,17 @@ def measure_support(
     for image in images:
         distance, weight = weights_at(image, vertices, normals)
         reach = max(voxel, SIGNIFICANT_SIGMAS * image.noise)
-        supports = (weight > 0) & (np.abs(distance) < reach)
-        w = np.where(supports, image.precision * weight, 0.0)
-        count += supports
+        agrees = (weight > 0) & (np.abs(distance) < reach)
+        w = np.where(agrees, image.precision * weight, 0.0)
+        count += agrees
         total += w
         squares += (w * image.noise) ** 2
-        scatter += w * np.where(supports, distance / image.noise, 0.0) ** 2
+        scatter += w * np.where(agrees, distance / image.noise, 0.0) ** 2
     known = count > 0
     scatter = count * np.divide(scatter, total, out=np.zeros(size), where=known)
     expected = np.divide(squares, total**2, out=np.full(size, np.nan), where=known)
     factor = (_PRIOR_SCANS + scatter) / (_PRIOR_SCANS + np.maximum(count - 1, 0))
-    return Support(count=count.astype(np.int64), stdev=np.sqrt(expected * factor))
+    return Agreement(count=count.astype(np.int64), stdev=np.sqrt(expected * factor))
 
 
 def weights_at(

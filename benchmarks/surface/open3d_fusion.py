@@ -10,7 +10,7 @@ import numpy as np
 
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
@@ -29,19 +29,17 @@ POISSON_REACH_VOXELS = 2.0
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Shape:
-    """A scan's surface at full resolution: points and normals (N, 3), faces, sensor frame."""
+    """A scan's surface at full resolution, as image and as mesh with normals, sensor frame."""
 
     camera: Camera
     depth: FloatArray
-    points: FloatArray
-    normals: FloatArray
-    faces: IntArray
+    mesh: TriangleMesh
     world_from_sensor: Pose
 
     @property
     def world_points(self) -> FloatArray:
         """(N, 3)."""
-        return self.world_from_sensor.apply(self.points)
+        return self.world_from_sensor.apply(self.mesh.vertices)
 
 
 def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
@@ -49,21 +47,7 @@ def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
     kept, points = surface_points(scan)
     pixel = scan.resolution
     camera, depth, mesh = render_surface(kept, points, pixel, pixel, 2.0 * pixel, PrepareConfig())
-    return Shape(
-        camera=camera,
-        depth=depth,
-        points=np.asarray(mesh.vertices),
-        normals=np.asarray(mesh.normals),
-        faces=np.asarray(mesh.faces),
-        world_from_sensor=world_from_sensor,
-    )
-
-
-def _open3d() -> ModuleType:
-    try:
-        return import_module("open3d")
-    except ImportError as error:
-        raise InputError(f"open3d: {error}: run pip install 'scanweld[bench]'") from error
+    return Shape(camera=camera, depth=depth, mesh=mesh, world_from_sensor=world_from_sensor)
 
 
 def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
@@ -82,13 +66,11 @@ def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
         seen = _as_pinhole(shape)
         c = seen.camera
         depth = np.where(np.isfinite(seen.depth), seen.depth, 0.0).astype(np.float32)
-        image, far = geometry.Image(depth), 2.0 * float(depth.max())
         lens = core.Tensor(np.array([[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1.0]]))
         pose = core.Tensor(seen.world_from_sensor.inverse().matrix())
-        blocks = grid.compute_unique_block_coordinates(
-            image, lens, pose, 1.0, far, TRUNCATION_VOXELS
-        )
-        grid.integrate(blocks, image, lens, pose, 1.0, far, TRUNCATION_VOXELS)
+        image = geometry.Image(depth)
+        how = (image, lens, pose, 1.0, 2.0 * float(depth.max()), TRUNCATION_VOXELS)
+        grid.integrate(grid.compute_unique_block_coordinates(*how), *how)
     return _converted(grid.extract_triangle_mesh(weight_threshold=0.0).to_legacy())
 
 
@@ -96,9 +78,9 @@ def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's screened Poisson reconstruction, cut off where there are no points."""
     o3d = _open3d()
     points = np.concatenate([shape.world_points for shape in shapes])
-    normals = np.concatenate([shape.world_from_sensor.turn(shape.normals) for shape in shapes])
+    normals = [s.world_from_sensor.turn(np.asarray(s.mesh.normals)) for s in shapes]
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.normals = o3d.utility.Vector3dVector(normals)
+    cloud.normals = o3d.utility.Vector3dVector(np.concatenate(normals))
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
         cloud, depth=0, width=voxel, n_threads=1
     )
@@ -107,18 +89,25 @@ def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     return _converted(mesh)
 
 
+def _open3d() -> ModuleType:
+    try:
+        return import_module("open3d")
+    except ImportError as error:
+        raise InputError(f"open3d: {error}: run pip install 'scanweld[bench]'") from error
+
+
 def _as_pinhole(shape: Shape) -> Shape:
     """The same surface as a pinhole sees it; from far away, if the sensor is none."""
     if shape.camera.model is CameraModel.PINHOLE:
         return shape
-    size = float(np.linalg.norm(np.ptp(shape.points, axis=0)))
-    back = np.array([0.0, 0.0, FAR_DIAMETERS * size - float(np.median(shape.points[:, 2]))])
-    points = shape.points + back
-    c, far = shape.camera, FAR_DIAMETERS * size
+    points = shape.mesh.vertices
+    far = FAR_DIAMETERS * float(np.linalg.norm(np.ptp(points, axis=0)))
+    back = np.array([0.0, 0.0, far - float(np.median(points[:, 2]))])
+    c = shape.camera
     camera = replace(c, model=CameraModel.PINHOLE, fx=far * c.fx, fy=far * c.fy)
-    depth, _ = render_depth(points, shape.faces, camera)
+    depth, _ = render_depth(points + back, shape.mesh.faces, camera)
     moved = shape.world_from_sensor @ Pose(rotation=np.eye(3), translation=-back)
-    return replace(shape, camera=camera, depth=depth, points=points, world_from_sensor=moved)
+    return replace(shape, camera=camera, depth=depth, world_from_sensor=moved)
 
 
 def _converted(mesh: Any) -> TriangleMesh:

@@ -1,0 +1,86 @@
+"""What other tools say of their own answers, on pairs of the same scans."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+from benchmarks.blocks import markdown_table
+from benchmarks.judging.runs import seeded
+from benchmarks.judging.trial import CONFIG, Outcome, is_right_pair
+from benchmarks.kept import Kept, Record, Result, Unit
+from benchmarks.paper.baselines.fpfh import fpfh_ransac
+from benchmarks.paper.baselines.kiss import kiss_gicp
+from benchmarks.paper.baselines.records import Method, ScanPair
+from benchmarks.scores import Stated
+from benchmarks.seeds import FIRST_FRESH
+from benchmarks.virtual.scenarios import SCENARIOS
+from benchmarks.virtual.scene import make_scene
+from scanweld.geometry.pose import Pose
+from scanweld.preparation.prepare import prepare
+
+ONCE = (
+    *("noise 0.25 %", "outliers 20 %", "dropouts 30 %", "flying pixels", "resolutions 1:4"),
+    *("crop at a height", "table", "hand", "2 of a like object", "mirrored scan"),
+    *("figure with a mirror plane", "vase", "box", "gear"),
+)
+COUNTS = {"ring of 6": 4, **dict.fromkeys(ONCE, 1)}
+"""Runs of each scenario whose pairs are compared."""
+METHODS: Mapping[str, Method] = {"fpfh": fpfh_ransac, "kiss": kiss_gicp}
+TITLES = {
+    "own": "scanweld: confidence",
+    "fpfh": "Open3D, FPFH and RANSAC, ICP: fitness",
+    "kiss": "KISS-Matcher, GICP: inliers",
+}
+
+
+@dataclass(kw_only=True)
+class OtherTools(Kept):
+    """Pairs of the scans of some runs, registered by other tools."""
+
+    first_seed: int = FIRST_FRESH
+    NAME: str = "rivals"
+    TITLE: str = "Other tools"
+
+    def units(self, quick: bool) -> list[Unit]:
+        """Scenario by scenario and seed by seed."""
+        return seeded({"64 pixels across": 1} if quick else COUNTS, self.first_seed)
+
+    def measure(self, unit: Unit) -> Result:
+        """Score and truth of every pair in the order of the names, by tool; None without a pose."""
+        scene = make_scene(SCENARIOS[unit["scenario"]], unit["seed"])
+        prepared = {scan.name: prepare(scan, CONFIG.prepare) for scan in scene.scans}
+        told: dict[str, list[Any]] = {name: [] for name in METHODS}
+        for i, j in combinations(sorted(prepared), 2):
+            pair = ScanPair(i=prepared[i], j=prepared[j], diameter=scene.diameter)
+            from_sensors = prepared[i].scan_from_sensor, prepared[j].scan_from_sensor.inverse()
+            for name, method in METHODS.items():
+                answer = method(pair, Pose.identity(), 0)
+                if answer.i_from_j is None:
+                    told[name].append(None)
+                    continue
+                found = from_sensors[0] @ answer.i_from_j @ from_sensors[1]
+                told[name].append([answer.score, int(is_right_pair(i, j, found, scene))])
+        return told
+
+
+def answers_by_tool(records: Sequence[Record], outcomes: Sequence[Outcome]) -> dict[str, Stated]:
+    """The answers of each tool to the pairs that all were given."""
+    runs = {(outcome.scenario, outcome.seed): outcome for outcome in outcomes}
+    common = [r for r in records if (r.unit["scenario"], r.unit["seed"]) in runs]
+    own = (p for r in common for p in runs[r.unit["scenario"], r.unit["seed"]].pairs)
+    others = {
+        name: Stated.of(told for record in common for told in record.result[name] if told)
+        for name in METHODS
+    }
+    return {"own": Stated.of((pair.confidence, pair.is_right) for pair in own if pair), **others}
+
+
+def other_tools_table(records: Sequence[Record], outcomes: Sequence[Outcome]) -> str:
+    """How well what each tool says of its answers tells right from wrong."""
+    rows = [
+        (TITLES[name], len(told), told.num_right, f"{told.auc:.3f}", f"{100 * told.sure:.0f}")
+        for name, told in answers_by_tool(records, outcomes).items()
+    ]
+    headings = ("tool, and what it says", "pairs with a pose", "right", "AUC", "sure %")
+    return markdown_table(headings, rows)

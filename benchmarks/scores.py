@@ -1,0 +1,101 @@
+"""How well what is stated of answers tells right from wrong, and whether it comes true."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from scipy.stats import rankdata
+
+from scanweld.geometry.arrays import BoolArray, FloatArray
+
+NUM_BINS = 12
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Bin:
+    """Answers of about the same confidence: their mean confidence, share right, and number."""
+
+    confidence: float
+    right: float
+    count: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stated:
+    """Scores (N,) that are stated of answers, and which (N,) of these are right."""
+
+    scores: FloatArray
+    is_right: BoolArray
+
+    @classmethod
+    def of(cls, answers: Iterable[tuple[float, bool]]) -> Self:
+        """From one pair an answer."""
+        scores, is_right = np.array(list(answers), dtype=float).reshape(-1, 2).T
+        return cls(scores, is_right.astype(bool))
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    @property
+    def num_right(self) -> int:
+        """Number of right answers."""
+        return int(self.is_right.sum())
+
+    @property
+    def auc(self) -> float:
+        """Chance that a right answer has a higher score than a wrong one; NaN without either."""
+        num_right, num_wrong = self.num_right, len(self) - self.num_right
+        if not num_right or not num_wrong:
+            return float("nan")
+        ranks = rankdata(self.scores)[self.is_right]
+        return float((ranks.sum() / num_right - 0.5 * (num_right + 1)) / num_wrong)
+
+    def bins(self, num_bins: int = NUM_BINS) -> list[Bin]:
+        """Answers in order of their score, in bins of equal numbers."""
+        order = np.argsort(self.scores, kind="stable")
+        return [
+            Bin(
+                confidence=float(self.scores[part].mean()),
+                right=float(self.is_right[part].mean()),
+                count=len(part),
+            )
+            for part in np.array_split(order, num_bins)
+            if len(part)
+        ]
+
+    def calibration_error(self, num_bins: int = NUM_BINS) -> float:
+        """Expected: mean over all answers of their bin's gap; NaN of none."""
+        gaps = sum(b.count * abs(b.confidence - b.right) for b in self.bins(num_bins))
+        return gaps / len(self) if len(self) else float("nan")
+
+    @property
+    def brier(self) -> float:
+        """Mean squared difference of confidence and truth; NaN of none."""
+        return float(np.mean((self.scores - self.is_right) ** 2)) if len(self) else float("nan")
+
+    def risk_coverage(self) -> tuple[FloatArray, FloatArray]:
+        """Share of answers that are taken, best first, and share of these that are wrong.
+
+        Answers of the same score are taken together.
+        """
+        order = np.argsort(-self.scores, kind="stable")
+        wrong, taken = np.cumsum(~self.is_right[order]), np.arange(1, len(order) + 1)
+        ends = np.append(np.flatnonzero(np.diff(self.scores[order])), len(order) - 1)
+        ends = ends[ends >= 0]
+        return taken[ends] / len(order), wrong[ends] / taken[ends]
+
+    @property
+    def sure(self) -> float:
+        """Share of the right answers that score higher than any wrong one; NaN of none."""
+        coverage, risk = self.risk_coverage()
+        taken = float(coverage[risk == 0].max(initial=0.0)) * len(self)
+        return taken / self.num_right if self.num_right else float("nan")
+
+
+def bound(num_runs: int) -> str:
+    """What none of so many independent runs says of the rate, with 95 % confidence: below 3 / n.
+
+    Scans of one run fail together, so that runs count and not scans.
+    """
+    return f"< {300 / num_runs:.2g} % of runs" if num_runs > 3 else "too few runs for a bound"

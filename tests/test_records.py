@@ -1,0 +1,189 @@
+"""Records as bytes: read back exactly, or not at all."""
+
+import io
+import json
+from dataclasses import dataclass, make_dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scanweld.app.cache import KEPT
+from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.slippage import Slide, Slippage
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.heat.features import Features
+from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.pairs.symmetry import Likeness, Symmetry
+from scanweld.work import source, stage_log
+from scanweld.work.records import RecordError, Records
+from scanweld.work.stage_log import work_key
+
+
+class Color(StrEnum):
+    RED = "red"
+    BLUE = "blue"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Inner:
+    color: Color
+    values: FloatArray | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Outer:
+    number: float
+    parts: tuple[Inner, ...]
+
+
+RECORDS = Records(Outer)
+OUTER = Outer(number=0.1, parts=(Inner(color=Color.RED, values=np.arange(3.0)),))
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two values are alike to the last bit, types and all."""
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray | np.generic):
+        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    if hasattr(a, "__dataclass_fields__"):
+        return all(same(getattr(a, name), getattr(b, name)) for name in a.__dataclass_fields__)
+    return a == b or (a != a and b != b)
+
+
+def changed(data: bytes, old: str, new: str) -> bytes:
+    """Bytes of a record whose JSON says something else."""
+    with np.load(io.BytesIO(data)) as stored:
+        arrays = dict(stored)
+    tree = arrays["tree"].tobytes().decode()
+    assert old in tree
+    arrays["tree"] = np.frombuffer(tree.replace(old, new).encode(), np.uint8)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def a_result() -> PairResult:
+    evidence = Evidence(agree=0.1, front=0.2, contradict=1 / 3, free=0, occluded=0, unknown=0)
+    pose = Alternative(i_from_j=Pose.exp([0.1, 0.2, 0.3, 4, 5, 6]), evidence=evidence)
+    return PairResult(
+        i=0,
+        j=3,
+        kind=PairKind.AMBIGUOUS,
+        reason="two poses, “alike”",
+        alternatives=(pose, pose),
+        information=np.random.default_rng(0).normal(size=(6, 6)),
+        observability=float("inf"),
+        margin=-0.0,
+        rms=float("nan"),
+        sliding=Slippage(slide=Slide.PLANE, axis=np.array([0.0, 0.0, 1.0]), point=None),
+        symmetry=Symmetry(likeness=next(iter(Likeness)), angles_deg=(90.0, 180.0)),
+        rests_on_feature=True,
+        further_ties=(pose,),
+    )
+
+
+def some_features() -> Features:
+    three, one = np.random.default_rng(1).normal(size=(4, 3)), np.linspace(0, 1, 4)
+    return Features(
+        points=three, normals=three, signatures=three, strengths=one, times=one[:3], found_at=three
+    )
+
+
+def test_what_a_run_keeps_comes_back_to_the_last_bit():
+    for value in (a_result(), some_features()):
+        kept = KEPT.from_bytes(KEPT.to_bytes(value))
+        assert same(kept, value)
+    assert isinstance(kept, Features) and not kept.points.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, True, 0, 10**30, 1e-310, float("-inf"), "a\n\u2028", (), ((1, 1.0), None), Color.BLUE],
+)
+def test_plain_values_come_back(value: object):
+    assert same(RECORDS.from_bytes(RECORDS.to_bytes(value)), value)
+
+
+def test_arrays_keep_type_shape_and_whether_they_are_frozen():
+    arrays = (np.zeros((0, 3), np.uint8), np.asfortranarray(np.eye(3)), np.float32(0.1))
+    frozen = np.arange(3)
+    frozen.flags.writeable = False
+    kept = RECORDS.from_bytes(RECORDS.to_bytes((*arrays, frozen)))
+    assert same(kept, (*arrays, frozen)) and isinstance(kept, tuple)
+    assert kept[0].flags.writeable and not kept[3].flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"Inner"', '"Outer"'),
+        ('"Inner"', '"Path"'),
+        ('"number"', '"amount"'),
+        ('"number": 0.1, ', ""),
+        ('"number"', '"extra": 1, "number"'),
+        ('"red"', '"green"'),
+        ('"enum": "Color"', '"enum": "Inner"'),
+        ('"array": 0', '"array": 7'),
+        ('"record"', '"what"'),
+        ("0.1", "[0.1]"),
+    ],
+)
+def test_what_does_not_fit_the_classes_is_refused(old: str, new: str):
+    data = RECORDS.to_bytes(OUTER)
+    assert same(RECORDS.from_bytes(changed(data, "0.1", "0.1")), OUTER)
+    with pytest.raises(RecordError):
+        RECORDS.from_bytes(changed(data, old, new))
+
+
+def test_a_record_is_refused_where_its_class_has_got_another_field():
+    data = RECORDS.to_bytes(OUTER)
+    for names in (["number"], ["number", "parts", "more"], ["number", "pieces"]):
+        other = make_dataclass("Outer", [(name, object) for name in names])
+        with pytest.raises(RecordError, match="fields"):
+            Records(other, Inner).from_bytes(data)
+
+
+def test_invariants_of_the_record_are_checked():
+    data = KEPT.to_bytes(a_result())
+    with pytest.raises(RecordError, match="i < j"):
+        KEPT.from_bytes(changed(data, '"i": 0', '"i": 3'))
+
+
+@pytest.mark.parametrize("data", [b"", b"PK", b"\x80\x04N.", json.dumps({}).encode()])
+def test_other_bytes_are_refused(data: bytes):
+    with pytest.raises(RecordError):
+        RECORDS.from_bytes(data)
+
+
+def test_cut_and_damaged_bytes_are_refused_or_read_right():
+    data = RECORDS.to_bytes(OUTER)
+    for length in range(0, len(data), 7):
+        with pytest.raises(RecordError):
+            RECORDS.from_bytes(data[:length])
+
+
+def test_classes_that_are_not_named_cannot_be_kept():
+    for value in (object(), [1], {"a": 1}, Pose.identity(), np.array([None])):
+        with pytest.raises(TypeError):
+            RECORDS.to_bytes(value)
+
+
+def test_work_is_done_anew_when_the_code_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "a.py").write_text("LIMIT = 1\n", encoding="utf-8")
+    before = source.code_digest(tmp_path)
+    (tmp_path / "a.py").write_text("LIMIT = 2\n", encoding="utf-8")
+    source.code_digest.cache_clear()
+    after = source.code_digest(tmp_path)
+    assert before != after
+    monkeypatch.setattr(stage_log, "code_digest", lambda: before)
+    key = work_key("pair", "a", 1.0)
+    assert key == work_key("pair", "a", 1.0) != work_key("pair", "a", 2.0)
+    monkeypatch.setattr(stage_log, "code_digest", lambda: after)
+    assert key != work_key("pair", "a", 1.0)
