@@ -16,9 +16,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PICTURE = ROOT / "docs" / "architecture.svg"
 
 LAYERS = (
-    ("__main__",),
+    ("__main__", "__init__"),
     ("app",),
-    ("__init__",),
     ("pipeline",),
     ("confidence", "knowledge"),
     ("graph", "published", "reconstruction"),
