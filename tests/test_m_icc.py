@@ -32,6 +32,7 @@ METHODS = {"m_icc": m_icc, "mm_icc": mm_icc}
 RING = [(0, 1), (1, 2), (2, 3), (3, 0)]
 PAIR = [(0, 1)]
 PullsOf = Callable[[LinkMatches, Mapping[int, Pose]], Pulls]
+FEW = {"num_renders": 3}
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,15 @@ def test_truth_stays_and_is_found_again(method: str, num: int):
         assert aligned.num_matches > 50 * len(edges)
 
 
+def test_orthographic_views_are_refined_too():
+    views = ring(2, CameraModel.ORTHOGRAPHIC)
+    for method in METHODS:
+        aligned = refine(method, views, views.disturbed(10.0), PAIR)
+        angle, shift = views.off_by(dict(aligned.poses))
+        assert angle < 4.0
+        assert shift < 0.015
+
+
 def test_views_together_close_the_ring():
     """Each edge alone leaves a gap at the end of the ring; all together share it out."""
     views = ring(4)
@@ -134,7 +144,7 @@ def test_views_together_close_the_ring():
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
-def test_moving_all_poses_moves_the_answer_and_swapped_scans_give_the_inverse(method: str):
+def test_moving_all_poses_moves_the_answer(method: str):
     views = ring(2)
     rng = np.random.default_rng(5)
     motion = Pose(rotation=random_rotation(rng), translation=rng.uniform(-300, 300, 3))
@@ -144,9 +154,16 @@ def test_moving_all_poses_moves_the_answer_and_swapped_scans_give_the_inverse(me
     off = (motion @ here[1]).inverse() @ there[1]
     assert off.angle_deg() < 0.3
     assert off.shift_at(middle(views.scans[1])) < 0.3 * views.scans[1].image.pixel
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_swapped_scans_give_the_inverse(method: str):
+    views = ring(2)
+    start = views.disturbed(10.0)
+    forth = refine(method, views, start, PAIR).poses
     swapped = Ring(scans=views.scans[::-1], truth={0: start[1], 1: start[0]})
     back = refine(method, swapped, swapped.truth, PAIR).poses
-    off = here[0].inverse() @ here[1] @ back[0].inverse() @ back[1]
+    off = forth[0].inverse() @ forth[1] @ back[0].inverse() @ back[1]
     assert off.angle_deg() < 1.0
     assert off.shift_at(middle(views.scans[0])) < 0.7 * views.scans[0].image.pixel
 
@@ -160,6 +177,17 @@ def test_unit_of_length_does_not_matter(method: str):
     np.testing.assert_allclose(a.poses[1].rotation, b.poses[1].rotation, atol=1e-3)
     assert b.rms == pytest.approx(a.rms, rel=0.02)
     assert b.coherence == pytest.approx(a.coherence, abs=0.02)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_same_bytes_each_time(method: str):
+    views = ring(4)
+    first, second = (
+        refine(method, views, views.disturbed(10.0), RING, PUBLISHED.model_copy(update=FEW))
+        for _ in range(2)
+    )
+    for k in first.poses:
+        assert first.poses[k].matrix().tobytes() == second.poses[k].matrix().tobytes()
 
 
 def test_too_few_contours_leave_a_view_and_say_so():
@@ -176,13 +204,16 @@ def test_too_few_contours_leave_a_view_and_say_so():
         assert method == "m_icc" or views.off_by(near)[0] < 2.5
 
 
-def test_each_part_of_the_edges_keeps_its_first_view_and_edges_need_poses():
+def test_each_part_of_the_edges_keeps_its_first_view():
     views = ring(4)
     start = views.disturbed(5.0)
     aligned = refine("mm_icc", views, start, [(1, 0), (2, 3)])
     for k in (0, 2):
         np.testing.assert_array_equal(aligned.poses[k].matrix(), start[k].matrix())
     assert all((aligned.poses[k].inverse() @ start[k]).angle_deg() > 1.0 for k in (1, 3))
+
+
+def test_edges_need_poses():
     views = ring(2)
     for edges in ([(0, 2)], [(1, 1)]):
         with pytest.raises(ValueError, match="needs two scans that both have a pose"):
@@ -280,10 +311,6 @@ def test_any_subset_of_the_prunings():
     _, second = kept_by(prunings=("observed",))
     assert len(second.observed) < len(everything.observed)
     assert len(second.predicted) == len(everything.predicted)
-    border, _ = kept_by(prunings=("self-occlusion",), self_occlusion="border")
-    place, _ = kept_by(prunings=("self-occlusion",), self_occlusion="place")
-    assert place < none
-    assert len(border ^ place) < 0.35 * len(none)
 
 
 @pytest.mark.parametrize("reading", ["face", "depth", "observed normal", "printed"])
@@ -293,3 +320,12 @@ def test_readings_of_the_third_pruning(reading: str):
     kept, _ = kept_by(prunings=("self-occlusion", "predicted"), predicted_visibility=reading)
     assert kept <= first
     assert len(kept) > 0.3 * len(first)
+
+
+def test_readings_of_the_first_pruning():
+    """By the rim's triangles or by the place in space: nearly the same points go."""
+    none, _ = kept_by(prunings=())
+    border, _ = kept_by(prunings=("self-occlusion",), self_occlusion="border")
+    place, _ = kept_by(prunings=("self-occlusion",), self_occlusion="place")
+    assert place < none
+    assert len(border ^ place) < 0.35 * len(none)

@@ -154,3 +154,13 @@ def test_summary_says_verdict_reasons_and_files(result: Reconstruction):
     assert "  component 2: scan_10" in lines
     text = summary(a_result([], {"a": "x", "b": "y"}), Path("model"))
     assert text.startswith("nothing: no two of the 2 scans") and "model.ply" not in text
+
+
+def test_no_confidence_at_all_is_the_least(tmp_path: Path):
+    result = a_result(["a", "b"])
+    scans = {
+        name: dataclasses.replace(result.scans[name], confidence=confidence)
+        for name, confidence in (("a", 0.5), ("b", 0.0))
+    }
+    text = summary(dataclasses.replace(result, scans=scans), tmp_path)
+    assert "least sure b: confidence 0.000" in text

@@ -17,7 +17,14 @@ from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.scan import RangeScan
 from scanweld.reconstruction import Reconstruction
-from scanweld.work.progress import Event, ScanRefused, StageAdvanced, StageFinished, StageStarted
+from scanweld.work.progress import (
+    Event,
+    ScanRefused,
+    StageAdvanced,
+    StageFinished,
+    StageStarted,
+    telling,
+)
 from tests.command_line import COARSE
 from tests.command_line import scanweld as command
 from tests.scenes import creature_scene, scene_of, write_scans
@@ -183,3 +190,10 @@ def test_names_of_any_kind_are_json():
     line = event_line(ScanRefused(scan=name, reason='"no"'))
     assert "\n" not in line and line.isascii()
     assert json.loads(line) == {"event": "scan_refused", "scan": name, "reason": '"no"'}
+
+
+def test_a_stage_that_fails_is_told_to_be_over():
+    events: list[Event] = []
+    with pytest.raises(RuntimeError), telling(events.append, "fuse"):
+        raise RuntimeError
+    assert [type(event) for event in events] == [StageStarted, StageFinished]

@@ -46,7 +46,11 @@ def verdict_sentence(verdict: Verdict, total: int, placed: int, pieces: int) -> 
 
 def _least_sure(result: Reconstruction) -> list[str]:
     """The placed scan in whose pose there is least confidence."""
-    known = [(scan.confidence, name) for name, scan in result.scans.items() if scan.confidence]
+    known = [
+        (scan.confidence, name)
+        for name, scan in result.scans.items()
+        if scan.confidence is not None
+    ]
     return [f"  least sure {name}: confidence {least:.3f}" for least, name in sorted(known)[:1]]
 
 

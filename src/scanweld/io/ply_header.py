@@ -135,7 +135,7 @@ def _header_lines(path: Path, data: bytes) -> tuple[list[str], int]:
 
 
 def _element(path: Path, line: str, words: list[str]) -> tuple[str, int, list[PlyProperty]]:
-    if len(words) != 2 or not words[1].isdigit():
+    if len(words) != 2 or not words[1].isdecimal():
         raise ReadError(f"{path}: '{line}' is not 'element NAME COUNT'; export the file anew")
     return words[0], int(words[1]), []
 

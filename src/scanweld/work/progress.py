@@ -51,12 +51,17 @@ def silent(event: Event) -> None:
 
 @contextmanager
 def telling(progress: Progress, stage: str) -> Iterator[dict[str, int | float]]:
-    """Tell of a stage's start and its end, with what is put into the yielded dict as its counts."""
+    """Tell of a stage's start and its end, with what is put into the yielded dict as its counts.
+
+    The end is told even where the stage fails, so that who shows progress can close its bar.
+    """
     counts: dict[str, int | float] = {}
     start = time.perf_counter()
     progress(StageStarted(stage=stage))
-    yield counts
-    progress(StageFinished(stage=stage, seconds=time.perf_counter() - start, counts=counts))
+    try:
+        yield counts
+    finally:
+        progress(StageFinished(stage=stage, seconds=time.perf_counter() - start, counts=counts))
 
 
 class Cache(Protocol):

@@ -32,7 +32,7 @@ IMAGE_SUFFIX = ".png"
 def recognise(text: str) -> bool:
     """Whether the text looks like this format."""
     words = next((line.split() for line in text.splitlines() if _is_data(line)), [])
-    return len(words) >= 10 and are_numbers(words[:9]) and words[0].isdigit()
+    return len(words) >= 10 and are_numbers(words[:9]) and words[0].isdecimal()
 
 
 def read(path: Path, text: str) -> PoseEntries:

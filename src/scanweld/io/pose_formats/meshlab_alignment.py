@@ -26,7 +26,7 @@ _MAX_NAME_BYTES = 1000
 def recognise(text: str) -> bool:
     """Whether the text looks like this format."""
     lines = text.splitlines()
-    return len(lines) > 2 and lines[0].strip().isdigit() and lines[2].startswith("#")
+    return len(lines) > 2 and lines[0].strip().isdecimal() and lines[2].startswith("#")
 
 
 def read(path: Path, text: str) -> PoseEntries:
@@ -37,7 +37,7 @@ def read(path: Path, text: str) -> PoseEntries:
     """
     lines = text.splitlines()
     first = lines[0].strip() if lines else ""
-    count = int(first) if first.isdigit() else 0
+    count = int(first) if first.isdecimal() else 0
     if not count or len(lines) < 1 + 6 * count:
         raise ReadError(
             f"{path}: does not hold the number of scans and 6 lines for each; save it anew"
