@@ -62,7 +62,9 @@ def build_view_graph(problem: GraphProblem) -> ViewGraph:
 
 def _assemble(problem: GraphProblem, excluded: Excluded) -> _Assembly:
     """Merge greedily; excluded alternatives propose nothing that no other one proposes."""
-    components: list[Poses] = [{k: Pose.identity()} for k in range(len(problem.centres))]
+    components = list(problem.initial)
+    alone = set(range(len(problem.centres))).difference(*components)
+    components += [{k: Pose.identity()} for k in sorted(alone)]
     used: list[Proposal] = []
     known: Known = {}
     while (found := best_merge(problem, components, excluded, known)) is not None:

@@ -107,11 +107,17 @@ def _off_edges(problem: GraphProblem, merge: Merge, a: Poses, b: Poses, poses: P
     return off_edges(merge, *both, problem.judge)
 
 
+def is_uncontradicted(
+    merge: Merge, config: GraphConfig, max_violated_share: float | None = None
+) -> bool:
+    """Whether neither a pair across nor all of them together speak against a merge."""
+    share = config.max_violated_share if max_violated_share is None else max_violated_share
+    return merge.worst <= config.max_violation and merge.violated <= share * merge.agree
+
+
 def _passes(merge: Merge, config: GraphConfig, max_violated_share: float) -> bool:
     """Whether a merge may be made: supported well enough, contradicted by no pair across."""
-    if merge.worst > config.max_violation or merge.margin < config.min_margin:
-        return False
-    if merge.violated > max_violated_share * merge.agree:
+    if merge.margin < config.min_margin or not is_uncontradicted(merge, config, max_violated_share):
         return False
     if any(proposal.is_good for proposal in merge.proposals):
         return merge.score > 0

@@ -168,6 +168,12 @@ def off_edges(merge: Merge, a: Poses, b: Poses, judge: PairJudge) -> Merge:
     return replace(_summed(merge.a_from_b, merge.proposals, evidence), margin=merge.margin)
 
 
+def judged_motion(a: Poses, b: Poses, a_from_b: Pose, judge: PairJudge) -> Merge:
+    """One motion between two components, whoever proposes it, judged by all pairs across."""
+    (merge,) = _judged_motions(a, b, [(a_from_b, ())], judge)
+    return merge
+
+
 def _judged_motions(a: Poses, b: Poses, motions: Sequence[Motion], judge: PairJudge) -> list[Merge]:
     """Each motion judged by all pairs across; a pair is asked of all motions at once."""
     moved = [{j: a_from_b @ b[j] for j in sorted(b)} for a_from_b, _ in motions]

@@ -29,6 +29,7 @@ class GraphProblem:
         settle: Refines a component's poses.
         config: Settings.
         apart: Pairs whose scans no merge may lay onto each other.
+        initial: Components that are there already.
     """
 
     pairs: Mapping[Edge, PairResult]
@@ -38,6 +39,7 @@ class GraphProblem:
     settle: Settle
     config: GraphConfig
     apart: Collection[Edge]
+    initial: Sequence[Poses] = ()
     _merges: dict[tuple[bytes, bytes], list[Merge]] = field(default_factory=dict)
     _settled: dict[bytes, Poses] = field(default_factory=dict)
 
@@ -47,7 +49,7 @@ class GraphProblem:
         if key not in self._merges:
             proposed = propose_merges(a, b, self.pairs, self.centres, self.same, self.judge)
             merges = unrefuted(a, b, proposed, self.judge)
-            self._merges[key] = [m for m in merges if not self._joins_apart(a, b, m)]
+            self._merges[key] = [m for m in merges if not self.joins_apart(a, b, m)]
         return self._merges[key]
 
     def settled(self, poses: Poses) -> Poses:
@@ -59,7 +61,7 @@ class GraphProblem:
             self._settled[key] = self.settle(poses)
         return self._settled[key]
 
-    def _joins_apart(self, a: Poses, b: Poses, merge: Merge) -> bool:
+    def joins_apart(self, a: Poses, b: Poses, merge: Merge) -> bool:
         """Whether a merge lays scans onto each other that are apart."""
         for i, j in self.apart:
             first, second = (i, j) if i in a else (j, i)

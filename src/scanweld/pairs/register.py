@@ -33,28 +33,29 @@ def register_pair(
     Returns:
         The result, with poses i_from_j between the sensor frames.
     """
-    found = search(problem, anchors)
-    alternatives = _ranked(found[: problem.config.num_alternatives])
-    decision = _by_features(problem, _ranked(found))
+    found = search(problem, anchors, problem.config.num_survivors)
+    alternatives = ranked(found[: problem.config.num_alternatives])
+    decision = _by_features(problem, ranked(found))
     if decision is not None:
         alternatives = _as_decided(problem, alternatives, decision)
     if polish is not None:
-        alternatives = _ranked(polished(problem, alternatives, polish))
+        alternatives = ranked(polished(problem, alternatives, polish))
         # Two that were distinct may have come to the same: an answer is no rival of itself.
         rows = pose_rows([option.i_from_j for option in alternatives])
         kept = problem.distinct(rows, problem.rival_tolerance, len(rows))
         alternatives = [alternatives[k] for k in kept]
     if start is not None:
-        alternatives = _with_start(problem, alternatives, _from_start(problem, start, polish))
+        alternatives = with_start(problem, alternatives, from_start(problem, start, polish))
     rests_on_feature = decision is not None and decision.is_hidden_in_others
     result = result_of(problem, tuple(alternatives), rests_on_feature=rests_on_feature)
     if decision is not None:
         return replace(result, passed_over=_others(problem, decision.passed_over, alternatives))
-    tied = ties(_ranked(found), problem.config.min_margin)
+    tied = ties(ranked(found), problem.config.min_margin)
     return replace(result, further_ties=_others(problem, tied, alternatives))
 
 
-def _ranked(alternatives: Sequence[Alternative]) -> list[Alternative]:
+def ranked(alternatives: Sequence[Alternative]) -> list[Alternative]:
+    """The alternatives, best scored first."""
     return sorted(alternatives, key=lambda alternative: -alternative.score)
 
 
@@ -63,7 +64,7 @@ def _others(
 ) -> tuple[Alternative, ...]:
     """Options that are the same answer as none of those listed already, best first."""
     left = [o for o in options if not any(problem.is_same(o, one) for one in listed)]
-    return tuple(_ranked(left))
+    return tuple(ranked(left))
 
 
 def _by_features(problem: PairProblem, alternatives: Sequence[Alternative]) -> Decision | None:
@@ -89,20 +90,20 @@ def _as_decided(
     return [decision.pose, *others]
 
 
-def _from_start(problem: PairProblem, start: Pose, polish: Polish | None) -> Alternative:
+def from_start(problem: PairProblem, start: Pose, polish: Polish | None) -> Alternative:
     """The best of a start pose, refined from near and from far: thin overlap may not pull right."""
     i, j, diameter = problem.i, problem.j, problem.diameter
     far, near = schedules(diameter)
     rows = pose_rows([start])
     tries = [rows, icp(i, j, rows, near, diameter)]
     tries.append(icp(i, j, icp(i, j, rows, far, diameter), near, diameter))
-    options = _ranked([problem.evaluate(to_pose(row)) for (row,) in tries])
+    options = ranked([problem.evaluate(to_pose(row)) for (row,) in tries])
     if polish is not None:
         options = polished(problem, options[:1], polish)
     return replace(options[0], is_given=True)
 
 
-def _with_start(
+def with_start(
     problem: PairProblem, alternatives: Sequence[Alternative], given: Alternative
 ) -> list[Alternative]:
     """The alternatives and a given one; where the search found it too, the better of the two."""
@@ -110,4 +111,4 @@ def _with_start(
     if same and same[0].score >= given.score:
         return list(alternatives)
     others = [option for option in alternatives if option not in same]
-    return _ranked([*others, replace(given, is_given=not same)])
+    return ranked([*others, replace(given, is_given=not same)])

@@ -1,4 +1,4 @@
-"""Registers the pairs of a run: the search, then the best poses refined."""
+"""Registers the pairs of a run: quickly, at a pose that is known, or thoroughly."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,9 +10,9 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features
 from scanweld.pairs.anchors import pair_anchors
-from scanweld.pairs.hypotheses import Anchors
 from scanweld.pairs.polish import JointPolish
 from scanweld.pairs.problem import PairProblem
+from scanweld.pairs.quick import ask, search_quickly
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairResult
 
@@ -25,7 +25,6 @@ class PairRegistrar:
 
     Attributes:
         scans: All scans.
-        anchors: Sets of anchors of each scan.
         fields: The scans, laid out.
         contours: Finds contour matches of two scans.
         config: Settings.
@@ -33,7 +32,6 @@ class PairRegistrar:
     """
 
     scans: Sequence[PreparedScan]
-    anchors: Sequence[tuple[Anchors, ...]]
     fields: Sequence[ScanField]
     contours: ContourMatcher
     config: Config
@@ -45,9 +43,21 @@ class PairRegistrar:
         config = self.config.pairs
         return PairProblem(edge=edge, i=i, j=j, config=config)
 
-    def register(self, edge: Edge) -> PairResult:
-        """Register a pair (i, j), i < j, from any start pose."""
-        i, j = edge
+    def search_quickly(self, edge: Edge) -> PairResult:
+        """A quick search of a pair (i, j), i < j, from any start pose."""
+        return search_quickly(self.problem(edge), self.starts.get(edge))
+
+    def ask(self, edge: Edge, i_from_j: Pose, found: PairResult | None) -> PairResult:
+        """A pair (i, j), i < j, at the pose that other pairs say, beside what was found of it."""
+        return ask(self.problem(edge), i_from_j, found)
+
+    def register(self, edge: Edge, features: Mapping[int, Features]) -> PairResult:
+        """Register a pair (i, j), i < j, thoroughly, from any start pose.
+
+        Args:
+            edge: The pair.
+            features: PA-HKS keypoints of its scans, unless the settings do without.
+        """
         problem = self.problem(edge)
         polish = JointPolish(
             scans=self.scans,
@@ -57,37 +67,5 @@ class PairRegistrar:
             contours=self.contours,
             config=self.config.refine,
         )
-        both = list(zip(self.anchors[i], self.anchors[j], strict=True))
-        return register_pair(problem, both, polish, self.starts.get(edge))
-
-
-def pair_registrar(
-    scans: Sequence[PreparedScan],
-    features: Sequence[Features | None],
-    fields: Sequence[ScanField],
-    contours: ContourMatcher,
-    config: Config,
-    starts: Mapping[Edge, Pose] | None = None,
-) -> PairRegistrar:
-    """What registers any pair of the given scans.
-
-    Args:
-        scans: All scans.
-        features: Their PA-HKS keypoints, or None.
-        fields: The scans, laid out.
-        contours: Finds contour matches of two scans.
-        config: Settings.
-        starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
-    """
-    anchors = [
-        pair_anchors(field, found, config.pairs)
-        for field, found in zip(fields, features, strict=True)
-    ]
-    return PairRegistrar(
-        scans=scans,
-        anchors=anchors,
-        fields=fields,
-        contours=contours,
-        config=config,
-        starts=starts or {},
-    )
+        sets = [pair_anchors(self.fields[k], features.get(k), self.config.pairs) for k in edge]
+        return register_pair(problem, list(zip(*sets, strict=True)), polish, self.starts.get(edge))

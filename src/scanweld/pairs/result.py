@@ -13,8 +13,6 @@ from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.symmetry import Symmetry
 
-RESULT_FORMAT = 2
-"""Raised when what is kept of a pair changes, so that work kept by another version is done anew."""
 MARGIN_WEIGHT = 2.0
 """Logarithm of the weight that a pose has over a rival which it beats by just the margin."""
 
@@ -131,6 +129,8 @@ class PairResult:
         passed_over: Those others, best first, where a feature decides.
         further_ties: More poses that explain the scans as well. They are reported, and propose
             nothing.
+        is_searched: Whether all was tried from any start. If not, the pose came from a quick search
+            or from other pairs, and the margin is over the rivals that were seen on the way.
     """
 
     i: int
@@ -147,6 +147,7 @@ class PairResult:
     rests_on_feature: bool = False
     passed_over: tuple[Alternative, ...] = ()
     further_ties: tuple[Alternative, ...] = ()
+    is_searched: bool = True
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

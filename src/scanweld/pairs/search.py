@@ -24,21 +24,26 @@ NUM_RIVALS = 24
 RANKING_WEIGHTS = search_weights(VIOLATION_WEIGHT)
 
 
-def search(problem: PairProblem, anchors: Sequence[tuple[Anchors, Anchors]]) -> list[Alternative]:
+def search(
+    problem: PairProblem,
+    anchors: Sequence[tuple[Anchors, Anchors]],
+    num_survivors: tuple[int, int],
+) -> list[Alternative]:
     """Distinct poses of a pair with their evidence, in the order of the search's own score.
 
     Args:
         problem: The two scans.
         anchors: Sets of anchors of i and j; all pairs within a set are tried.
+        num_survivors: Hypotheses that are kept for the first and for the second refinement.
     """
     config, diameter = problem.config, problem.diameter
     coarse, middle, fine = (t * diameter for t in config.tolerance_diameters)
     far, near = schedules(diameter)
     hypotheses = same_hypothesis(diameter)
     poses = _swept(problem, anchors, coarse)
-    poses = poses[problem.distinct(poses, hypotheses, config.num_survivors[0])]
+    poses = poses[problem.distinct(poses, hypotheses, num_survivors[0])]
     poses = _refined(problem, poses, far, middle)
-    poses = poses[problem.distinct(poses, hypotheses, config.num_survivors[1])]
+    poses = poses[problem.distinct(poses, hypotheses, num_survivors[1])]
     poses = _refined(problem, poses, near, fine)
     poses = poses[problem.distinct(poses, problem.rival_tolerance, NUM_RIVALS)]
     return [problem.evaluate(to_pose(row)) for row in poses]

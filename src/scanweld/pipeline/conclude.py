@@ -147,7 +147,7 @@ def _scan_report(
     scene: Scene,
     graph: ViewGraph,
 ) -> ScanReport:
-    prepared, found = scene.intake.prepared, scene.features[k]
+    prepared, found = scene.intake.prepared, scene.features.get(k)
     scan = prepared[k]
     neighbours = graph.neighbours(k)
     overlap = None

@@ -1,10 +1,12 @@
 """What sets a method apart: how it registers pairs, settles components and refines poses."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
 
 from scanweld.config import Section
 from scanweld.evidence.judge import Judge
+from scanweld.geometry.pose import Pose
 from scanweld.graph.problem import Settle
 from scanweld.graph.refine_graph import Refine
 from scanweld.graph.view_graph import Edge
@@ -19,29 +21,46 @@ class Scene:
 
     Attributes:
         intake: The scans, prepared, and what users know of them.
-        features: PA-HKS keypoints of each scan; None where the settings do without.
         judge: Gives the evidence on any pair at any pose.
+        features: PA-HKS keypoints of the scans for which something asked for them.
     """
 
     intake: Intake
-    features: Sequence[Features | None]
     judge: Judge
+    features: Mapping[int, Features] = field(default_factory=dict)
+
+
+class Shortcuts(Protocol):
+    """Ways to spare the thorough search where scans leave no doubt."""
+
+    def search_quickly(self, edge: Edge) -> PairResult:
+        """A quick search of a pair (i, j), i < j."""
+        ...
+
+    def ask(self, edge: Edge, i_from_j: Pose, found: PairResult | None) -> PairResult:
+        """A pair (i, j), i < j, at the pose that other pairs say, beside what was found of it."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Method:
-    """The three steps in which the robust and the published method differ.
+    """The steps in which the robust and the published method differ.
 
     Attributes:
         name: Of the method, for the keys of finished work.
         settings: Sections that a pair's result depends on.
-        register: Registers a pair (i, j), i < j, and judges what two scans alone say.
+        register: Registers a pair (i, j), i < j, with the keypoints of its scans, and judges what
+            two scans alone say.
         settle: Refines the poses of a component as it grows.
         refine: Refines all poses of a component together.
+        needs_features: Whether registering takes PA-HKS keypoints.
+        shortcuts: What spares the thorough search of many pairs; None to search them all.
     """
 
     name: str
-    settings: Sequence[Section]
-    register: Callable[[Edge], PairResult]
+    settings: tuple[Section, ...]
+    register: Callable[[Edge, Mapping[int, Features]], PairResult]
     settle: Settle
     refine: Refine
+    needs_features: bool = True
+    shortcuts: Shortcuts | None = None

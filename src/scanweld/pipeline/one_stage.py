@@ -17,7 +17,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.heat.features import describe
-from scanweld.pairs.registrar import pair_registrar
+from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pairs.result import PairKind
 from scanweld.pipeline.conclude import pair_report
 from scanweld.preparation.prepare import prepare as prepare_scan
@@ -60,11 +60,11 @@ def register_pair(a: RangeScan, b: RangeScan, config: Config | None = None) -> P
     config = config or Config()
     with single_threaded_algebra():
         prepared = [prepare(scan, config) for scan in sorted((a, b), key=lambda scan: scan.name)]
-        features = [describe(scan, config.heat) for scan in prepared]
+        features = {k: describe(scan, config.heat) for k, scan in enumerate(prepared)}
         fields = [make_field(scan) for scan in prepared]
         contours = contour_matcher(prepared, config.contours)
-        registrar = pair_registrar(prepared, features, fields, contours, config)
-        result = registrar.register((0, 1))
+        registrar = PairRegistrar(scans=prepared, fields=fields, contours=contours, config=config)
+        result = registrar.register((0, 1), features)
     is_good = result.kind is PairKind.GOOD
     graph = ViewGraph(
         pairs={(0, 1): result},

@@ -14,6 +14,7 @@ from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
 from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
+from scanweld.heat.features import Features
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import no_pose
@@ -51,14 +52,12 @@ class _PublishedRegistrar:
     scene: Scene
     config: Config
 
-    def register(self, edge: Edge) -> PairResult:
+    def register(self, edge: Edge, features: Mapping[int, Features]) -> PairResult:
         """Register a pair; where a start pose is given, what MM-ICC makes of it counts as well."""
         i, j = edge
-        prepared, features = self.scene.intake.prepared, self.scene.features
-        found_i, found_j = features[i], features[j]
-        assert found_i is not None and found_j is not None
+        prepared = self.scene.intake.prepared
         coarse = register_as_published(
-            prepared[i], prepared[j], found_i, found_j, self.config.coarse
+            prepared[i], prepared[j], features[i], features[j], self.config.coarse
         )
         starts = [coarse.i_from_j, self.scene.intake.known.starts.get(edge)]
         results = [self._refined(edge, start) for start in starts if start is not None]

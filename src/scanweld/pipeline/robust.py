@@ -1,4 +1,4 @@
-"""The robust method: from any start, every pair searched and judged."""
+"""The robust method: from any start, every pair judged."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,7 +8,7 @@ from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
 from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
-from scanweld.pairs.registrar import pair_registrar
+from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pipeline.method import Method, Scene
 from scanweld.refinement.refine import refine_poses, scan_rms
 
@@ -20,8 +20,13 @@ def robust_method(scene: Scene, config: Config) -> Method:
     """The robust method for the scans of a run."""
     scans = scene.intake.prepared
     contours = contour_matcher(scans, config.contours)
-    starts = scene.intake.known.starts
-    registrar = pair_registrar(scans, scene.features, scene.judge.fields, contours, config, starts)
+    registrar = PairRegistrar(
+        scans=scans,
+        fields=scene.judge.fields,
+        contours=contours,
+        config=config,
+        starts=scene.intake.known.starts,
+    )
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
     def settle(poses: Poses) -> Poses:
@@ -37,4 +42,6 @@ def robust_method(scene: Scene, config: Config) -> Method:
         register=registrar.register,
         settle=settle,
         refine=refine,
+        needs_features=config.pairs.keypoints != "even",
+        shortcuts=registrar,
     )

@@ -4,23 +4,20 @@ from collections.abc import Mapping, Sequence
 
 from scanweld.config import Config
 from scanweld.geometry.scan import RangeScan
-from scanweld.heat.features import Features
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline.conclude import conclude
 from scanweld.pipeline.intake import Intake, take_in
 from scanweld.pipeline.method import Scene
 from scanweld.pipeline.published import published_method
+from scanweld.pipeline.registration import common_axis, register_pairs
 from scanweld.pipeline.robust import robust_method
 from scanweld.pipeline.stages import (
     assess_placed,
     check_knowledge,
-    common_axis,
-    describe_scans,
     fuse_largest,
     lay_out,
     place_scans,
     refine_placed,
-    register_pairs,
 )
 from scanweld.reconstruction import Reconstruction
 from scanweld.work.progress import Cache, NoCache, Progress, silent
@@ -75,22 +72,14 @@ def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructio
         config: Settings of every stage.
         stages: Bookkeeping of the run.
     """
-    features = _features(intake, config, stages)
-    judge = lay_out(intake, config, stages)
-    scene = Scene(intake=intake, features=features, judge=judge)
+    scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
     method = METHODS[config.method](scene, config)
-    found = register_pairs(scene, method, stages)
-    axis = common_axis(scene, found, config)
-    graph = place_scans(scene, found, axis, method, config, stages)
+    registered = register_pairs(scene, method, config, stages)
+    scene = registered.scene
+    axis = common_axis(scene, registered.pairs, config)
+    graph = place_scans(registered, axis, method, config, stages)
     graph = refine_placed(scene, graph, axis, method, config, stages)
     graph, confidence = assess_placed(scene, graph, config, stages)
     mesh = fuse_largest(intake, graph, config, stages)
     facts = check_knowledge(scene, graph, axis)
     return conclude(scene, graph, confidence, mesh, facts, config, stages.reports)
-
-
-def _features(intake: Intake, config: Config, stages: Stages) -> Sequence[Features | None]:
-    """PA-HKS keypoints of every scan, unless the settings do without."""
-    if config.method == "robust" and config.pairs.keypoints == "even":
-        return [None] * len(intake.prepared)
-    return describe_scans(intake, config, stages)

@@ -1,9 +1,7 @@
 """The stages of a run, one after the other."""
 
 import logging
-from collections.abc import Mapping
 from dataclasses import replace
-from itertools import combinations
 
 from scanweld.confidence.assess import Confidence, assess
 from scanweld.confidence.diagnostics import diagnostics_of
@@ -14,39 +12,23 @@ from scanweld.evidence.field import make_field
 from scanweld.evidence.judge import Judge
 from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.geometry.pose import Pose
-from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.assemble import build_view_graph
-from scanweld.graph.problem import GraphProblem
 from scanweld.graph.reasons import doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
-from scanweld.graph.view_graph import Edge, ViewGraph
-from scanweld.heat.features import Features, describe
-from scanweld.knowledge.check import Registered, check_facts
-from scanweld.knowledge.turntable import Turntable, find_turntable, off_axis_doubts
-from scanweld.knowledge.usable_pairs import LenientVerdict, usable_pairs, with_found_pairs
-from scanweld.pairs.result import RESULT_FORMAT, PairResult
+from scanweld.graph.view_graph import ViewGraph
+from scanweld.knowledge import check
+from scanweld.knowledge.turntable import Turntable, off_axis_doubts
+from scanweld.knowledge.usable_pairs import with_found_pairs
 from scanweld.pipeline.intake import Intake
 from scanweld.pipeline.method import Method, Scene
+from scanweld.pipeline.problem import graph_problem
+from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
 from scanweld.refinement.scale import estimate_scales
 from scanweld.work.progress import ScanRefused
-from scanweld.work.stage_log import Stages, work_key
+from scanweld.work.stage_log import Stages
 
 logger = logging.getLogger(__name__)
-
-
-def describe_scans(intake: Intake, config: Config, stages: Stages) -> list[Features]:
-    """PA-HKS keypoints of every scan (paper 3.1)."""
-    with stages.stage("features") as counts:
-        found = stages.each(
-            "features",
-            lambda scan: describe(scan, config.heat),
-            intake.prepared,
-            lambda scan: work_key("features", scan.work_hash, config.prepare, config.heat),
-        )
-        counts["keypoints"] = sum(len(f.points) for f in found)
-    return found
 
 
 def lay_out(intake: Intake, config: Config, stages: Stages) -> Judge:
@@ -58,41 +40,8 @@ def lay_out(intake: Intake, config: Config, stages: Stages) -> Judge:
     return Judge(fields=fields, diameter=intake.diameter, tolerance=tolerance)
 
 
-def register_pairs(scene: Scene, method: Method, stages: Stages) -> dict[Edge, PairResult]:
-    """Register every pair of scans, and judge what two scans alone say."""
-    intake = scene.intake
-    edges = list(combinations(range(len(intake.prepared)), 2))
-
-    def key(edge: Edge) -> str:
-        hashes = [intake.prepared[k].work_hash for k in edge]
-        start = intake.known.start_key(edge)
-        what = f"{method.name} pair"
-        return work_key(what, RESULT_FORMAT, *hashes, *method.settings, *start)
-
-    with stages.stage("pairs") as counts:
-        results = stages.each("pairs", method.register, edges, key)
-        counts["pairs"] = len(results)
-    return {
-        edge: replace(result, i=edge[0], j=edge[1])
-        for edge, result in zip(edges, results, strict=True)
-    }
-
-
-def common_axis(scene: Scene, found: Mapping[Edge, PairResult], config: Config) -> Turntable | None:
-    """The axis about which most good pairs turn, in frames of the sensors or of the files.
-
-    None if the scans are not said to have one.
-    """
-    if not scene.intake.known.turntable:
-        return None
-    sensors = [Pose.identity() for _ in scene.judge.fields]
-    files = [scan.scan_from_sensor for scan in scene.intake.prepared]
-    return find_turntable(found, [sensors, files], scene.judge.centres, _same(scene, config))
-
-
 def place_scans(
-    scene: Scene,
-    found: Mapping[Edge, PairResult],
+    registered: Registered,
     axis: Turntable | None,
     method: Method,
     config: Config,
@@ -101,26 +50,16 @@ def place_scans(
     """Place what the pairs can place together without contradiction, as far as users' facts allow.
 
     Args:
-        scene: The scans.
-        found: Every pair, judged.
+        registered: The scans, and every pair, judged.
         axis: The common axis, if there is one.
         method: Refines the poses of a component as it grows.
         config: Settings.
         stages: Bookkeeping of the run.
     """
-    judge, known = scene.judge, scene.intake.known
+    scene, found = registered.scene, registered.pairs
     with stages.stage("graph") as counts:
-        verdict = LenientVerdict(fields=judge.fields, config=config.pairs)
-        problem = GraphProblem(
-            pairs=usable_pairs(found, known, axis, verdict),
-            centres=judge.centres,
-            same=_same(scene, config),
-            judge=judge,
-            settle=method.settle,
-            config=config.graph,
-            apart=known.apart,
-        )
-        graph = with_found_pairs(build_view_graph(problem), found, known)
+        problem = graph_problem(scene, found, axis, method, config, registered.components)
+        graph = with_found_pairs(build_view_graph(problem), found, scene.intake.known)
         counts["accepted"] = len(graph.accepted)
         counts["components"] = len(graph.components)
     return graph
@@ -190,16 +129,10 @@ def check_knowledge(
     scene: Scene, graph: ViewGraph, axis: Turntable | None
 ) -> tuple[FactReport, ...]:
     """Every fact that users gave against what was found."""
-    registered = Registered(
+    registered = check.Registered(
         prepared=scene.intake.prepared, graph=graph, judge=scene.judge, turntable=axis
     )
-    return check_facts(scene.intake.knowledge, registered)
-
-
-def _same(scene: Scene, config: Config) -> PoseTolerance:
-    """Poses of a scan that differ by less close a cycle."""
-    shift = config.graph.max_cycle_diameters * scene.judge.diameter
-    return PoseTolerance(angle_deg=config.graph.max_cycle_deg, shift=shift)
+    return check.check_facts(scene.intake.knowledge, registered)
 
 
 def fuse_largest(

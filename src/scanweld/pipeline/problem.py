@@ -1,0 +1,51 @@
+"""The problem that the view graph is built from, as users' facts let its pairs be used."""
+
+from collections.abc import Mapping, Sequence
+
+from scanweld.config import Config
+from scanweld.evidence.judge import Poses
+from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.graph.problem import GraphProblem
+from scanweld.graph.view_graph import Edge
+from scanweld.knowledge.turntable import Turntable
+from scanweld.knowledge.usable_pairs import LenientVerdict, usable_pairs
+from scanweld.pairs.result import PairResult
+from scanweld.pipeline.method import Method, Scene
+
+
+def graph_problem(
+    scene: Scene,
+    found: Mapping[Edge, PairResult],
+    axis: Turntable | None,
+    method: Method,
+    config: Config,
+    components: Sequence[Poses] = (),
+) -> GraphProblem:
+    """Pairs as users' facts let them be used, and who judges and settles what comes of them.
+
+    Args:
+        scene: The scans.
+        found: Pairs, judged.
+        axis: The common axis, if there is one.
+        method: Refines the poses of a component as it grows.
+        config: Settings.
+        components: What is placed together already.
+    """
+    judge, known = scene.judge, scene.intake.known
+    verdict = LenientVerdict(fields=judge.fields, config=config.pairs)
+    return GraphProblem(
+        pairs=usable_pairs(found, known, axis, verdict),
+        centres=judge.centres,
+        same=same_pose(scene, config),
+        judge=judge,
+        settle=method.settle,
+        config=config.graph,
+        apart=known.apart,
+        initial=components,
+    )
+
+
+def same_pose(scene: Scene, config: Config) -> PoseTolerance:
+    """Poses of a scan that differ by less close a cycle."""
+    shift = config.graph.max_cycle_diameters * scene.judge.diameter
+    return PoseTolerance(angle_deg=config.graph.max_cycle_deg, shift=shift)
