@@ -84,7 +84,7 @@ class PairsConfig(Section):
     """Rotations about the normal that are tried for each pair of matched points."""
     tolerance_diameters: tuple[Positive, Positive, Positive] = (0.04, 0.02, 0.012)
     """Depth difference up to which two surfaces agree, in the coarse, middle and fine stage."""
-    num_survivors: tuple[Count, Count] = (1600, 100)
+    num_survivors: tuple[Count, Count] = (400, 60)
     """Hypotheses that are kept for the first and for the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
     """Distinct poses of a pair that are passed to the view graph, at most."""

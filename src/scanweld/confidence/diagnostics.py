@@ -1,11 +1,11 @@
 """What is measured of a pose of two scans besides the evidence: how well and firmly they fit."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scanweld.confidence.misfit import pair_misfit
 from scanweld.config import ContoursConfig
-from scanweld.contours.coherence import contour_coherence
+from scanweld.contours.coherence import ContourMatcher, contour_matcher
 from scanweld.evidence.information import information_of, observability_of
 from scanweld.evidence.judge import Judge
 from scanweld.geometry.pose import Pose
@@ -40,12 +40,12 @@ class PairDiagnostics:
     Attributes:
         judge: Gives the evidence on any pair at any pose.
         sources: Surface points of the scans.
-        cohere: Gives the contour coherence of scans i and j at i_from_j.
+        contours: Compares the contours of any two scans.
     """
 
     judge: Judge
     sources: Sequence[SurfaceSource]
-    cohere: Callable[[int, int, Pose], float]
+    contours: ContourMatcher
 
     def fit(self, i: int, j: int, i_from_j: Pose, *, at_contours: bool) -> Fit:
         """How two scans fit at a pose; where contours are not asked about, none cohere."""
@@ -55,7 +55,7 @@ class PairDiagnostics:
             observability=observability_of(information),
             residual=over(rms, self.judge.tolerance),
             misfit=pair_misfit(self.sources[i], self.sources[j], i_from_j, *size),
-            coherence=self.cohere(i, j, i_from_j) if at_contours else 0.0,
+            coherence=self.contours.coherence(i, j, i_from_j) if at_contours else 0.0,
         )
 
 
@@ -66,7 +66,7 @@ def diagnostics_of(
     return PairDiagnostics(
         judge=judge,
         sources=[surface_source(scan, NUM_POINTS) for scan in prepared],
-        cohere=contour_coherence(prepared, config),
+        contours=contour_matcher(prepared, config),
     )
 
 

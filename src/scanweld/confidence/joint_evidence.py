@@ -72,14 +72,20 @@ def joint_evidence(
     poses = component.poses
     between = {
         (i, j): diagnostics.judge.pair(i, j, poses[i].inverse() @ poses[j])
-        for i, j in combinations(sorted(poses), 2)
+        for i, j in graph.compared(component)
     }
-    standings = {k: _standing(k, graph, poses, between, diagnostics) for k in sorted(poses)}
+    near = {
+        k: {m: poses[m] for edge in between if k in edge for m in edge if m != k} for k in poses
+    }
+    standings = {
+        k: _standing(k, graph, {k: poses[k], **near[k]}, between, diagnostics)
+        for k in sorted(poses)
+    }
     return JointEvidence(
         between=between,
         margins={k: standing.margin for k, standing in standings.items()},
         refutations={k: standing.refutation for k, standing in standings.items()},
-        fits={k: _fit(k, poses, diagnostics) for k in sorted(poses)},
+        fits={k: _fit(k, {k: poses[k], **near[k]}, diagnostics) for k in sorted(poses)},
         conductance=_conductance(graph, component),
     )
 
@@ -99,7 +105,7 @@ def _standing(
     between: Mapping[Edge, Evidence],
     diagnostics: PairDiagnostics,
 ) -> _Standing:
-    """The place of a scan beside other places, all other scans being where they are."""
+    """The place of a scan beside other places, its partners being where they are."""
     others = {m: pose for m, pose in poses.items() if m != k}
     judge = diagnostics.judge
     same = PoseTolerance(angle_deg=RIVAL_ANGLE_DEG, shift=RIVAL_SHIFT_DIAMETERS * judge.diameter)

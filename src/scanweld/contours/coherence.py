@@ -1,7 +1,7 @@
 """Contour coherence of two scans: predicted contours of one beside observed ones of the other."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -49,6 +49,11 @@ class ContourPair:
 
     predicted: ContourPoints
     observed: ContourPoints
+
+    def moved(self, motion: Pose) -> "ContourPair":
+        """The same after a small motion of scan i in the frame of j: pixels stay what they were."""
+        points, normals = motion.apply(self.predicted.points), motion.turn(self.predicted.normals)
+        return replace(self, predicted=replace(self.predicted, points=points, normals=normals))
 
 
 def contour_pair(
@@ -145,10 +150,13 @@ class ContourMatcher:
     observed: Sequence[ObservedContours]
     config: ContoursConfig
 
-    def matches(self, i: int, j: int, j_from_i: Pose) -> Matches:
-        """Contour matches of scan i, rendered into camera j, on scan j; sensor frame of j."""
+    def pair(self, i: int, j: int, j_from_i: Pose) -> ContourPair:
+        """Contours of scan i, rendered into camera j, and those of scan j that it could show."""
+        return contour_pair(self.observed[i], self.observed[j], j_from_i, self.config)
+
+    def matches(self, j: int, pair: ContourPair) -> Matches:
+        """Matches of predicted contours on those observed in scan j; sensor frame of j."""
         image = self.observed[j].scan.image
-        pair = contour_pair(self.observed[i], self.observed[j], j_from_i, self.config)
         return outline_matches(pair, image.camera, LAST_MATCH_PIXELS * image.pixel)
 
     def coherence(self, i: int, j: int, i_from_j: Pose) -> float:
@@ -168,10 +176,3 @@ class ContourMatcher:
 def contour_matcher(scans: Sequence[PreparedScan], config: ContoursConfig) -> ContourMatcher:
     """Find the contours of all scans once, for comparing them pair by pair."""
     return ContourMatcher(observed=[observe_contours(s, config) for s in scans], config=config)
-
-
-def contour_coherence(
-    scans: Sequence[PreparedScan], config: ContoursConfig
-) -> Callable[[int, int, Pose], float]:
-    """``ContourMatcher.coherence`` of some scans."""
-    return contour_matcher(scans, config).coherence

@@ -99,8 +99,8 @@ def find_doubts(graph: ViewGraph, judge: PairJudge, config: GraphConfig) -> dict
     for component in graph.components:
         for k in _rest_on_feature_alone(graph, component):
             doubts[k] = "only a small mark decides its pose: others hide the mark"
-        for k in sorted(component.poses):
-            share = _violated_share(k, component, judge)
+        shares = _violated_shares(graph, component, judge)
+        for k, share in shares.items():
             if share > config.max_violated_share:
                 doubts[k] = (
                     f"other sensors saw through its surface, or it hides theirs: {share:.0%} of "
@@ -126,13 +126,16 @@ def _strength(scan: int, graph: ViewGraph) -> float:
     return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
 
 
-def _violated_share(scan: int, component: Component, judge: PairJudge) -> float:
-    """Samples that speak against a scan's pose, as a share of those that agree."""
+def _violated_shares(graph: ViewGraph, component: Component, judge: PairJudge) -> dict[int, float]:
+    """Samples that speak against each scan's pose, as a share of those that agree."""
     poses = component.poses
-    evidence = [judge.pair(scan, m, poses[scan].inverse() @ poses[m]) for m in poses if m != scan]
-    agree = sum(e.agree for e in evidence)
-    violated = sum(e.surface_violation for e in evidence)
-    return violated / max(agree, 1e-9)
+    agree, violated = dict.fromkeys(sorted(poses), 0.0), dict.fromkeys(sorted(poses), 0.0)
+    for i, j in graph.compared(component):
+        evidence = judge.pair(i, j, poses[i].inverse() @ poses[j])
+        for k in (i, j):
+            agree[k] += evidence.agree
+            violated[k] += evidence.surface_violation
+    return {k: violated[k] / max(agree[k], 1e-9) for k in agree}
 
 
 def _good_but_rejected(graph: ViewGraph) -> list[Edge]:

@@ -14,8 +14,8 @@ logger = logging.getLogger(__name__)
 
 Refined = tuple[Mapping[int, Pose], Mapping[int, float]]
 """Poses, and the residual rms of the scans that have one."""
-Refine = Callable[[Mapping[int, Pose], Sequence[Edge]], Refined]
-"""Refines ``world_from_sensor`` of a component's scans, given its accepted pairs."""
+Refine = Callable[[Mapping[int, Pose], Sequence[Edge], Sequence[Edge]], Refined]
+"""Refines ``world_from_sensor`` of a component's scans, given its accepted and compared pairs."""
 
 MAX_SCORE_LOSS = 0.03
 """Mean score that a refinement may cost: it is judged by few samples."""
@@ -37,7 +37,7 @@ def refine_graph(graph: ViewGraph, refine: Refine, judge: PairJudge) -> ViewGrap
     doubts: dict[int, str] = {}
     for component in graph.components:
         edges = [edge for edge in graph.accepted if edge[0] in component.poses]
-        refined, rms_of = refine(component.poses, edges)
+        refined, rms_of = refine(component.poses, edges, graph.compared(component))
         loss = _mean_score(component.poses, edges, judge) - _mean_score(refined, edges, judge)
         if loss > MAX_SCORE_LOSS:
             logger.warning("the joint refinement made the evidence worse and is left out")

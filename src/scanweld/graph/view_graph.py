@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import Alternative, PairResult
@@ -55,6 +56,11 @@ class ViewGraph:
     doubts: Mapping[int, str] = field(default_factory=dict)
     rms: Mapping[int, float] = field(default_factory=dict)
     remarks: Mapping[Edge, str] = field(default_factory=dict)
+
+    def compared(self, component: Component) -> list[Edge]:
+        """Pairs (i, j), i < j, of a component's scans of which something was asked, in order."""
+        inside = combinations(sorted(component.poses), 2)
+        return [edge for edge in inside if self.pairs[edge].is_compared]
 
     def neighbours(self, scan: int) -> tuple[int, ...]:
         """Scans that share an accepted pair with one, in order."""

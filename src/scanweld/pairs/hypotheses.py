@@ -86,7 +86,8 @@ class Anchors:
         least = np.eye(3)[np.argmin(np.abs(n), axis=1)]
         x = np.cross(least, n).astype(np.float64)
         x /= np.linalg.norm(x, axis=1, keepdims=True)
-        return np.stack([x, np.cross(n, x), n], axis=2)
+        y = np.cross(n, x).astype(np.float64)
+        return np.stack([x, y, n], axis=2)
 
 
 def sweep(
@@ -126,7 +127,8 @@ def sweep(
     a, b, turn = np.unravel_index(left, scores.shape)
     rotations = _turned(anchors_i, num_turns, 1.0)[a, turn] @ anchors_j.rotations()[b].mT
     shifts = anchors_i.points[a] - np.einsum("nrk,nk->nr", rotations, anchors_j.points[b])
-    return np.column_stack([rotations.reshape(-1, 9), shifts]), scores.ravel()[left]
+    rows = np.column_stack([rotations.reshape(-1, 9), shifts])
+    return rows, scores.ravel()[left].astype(np.float64)
 
 
 def _turned(anchors: Anchors, num_turns: int, sense: float) -> FloatArray:

@@ -131,6 +131,7 @@ class PairResult:
             nothing.
         is_searched: Whether all was tried from any start. If not, the pose came from a quick search
             or from other pairs, and the margin is over the rivals that were seen on the way.
+        is_compared: Whether anything was asked of the two scans at all.
     """
 
     i: int
@@ -148,6 +149,7 @@ class PairResult:
     passed_over: tuple[Alternative, ...] = ()
     further_ties: tuple[Alternative, ...] = ()
     is_searched: bool = True
+    is_compared: bool = True
 
     def __post_init__(self) -> None:
         if not self.i < self.j:

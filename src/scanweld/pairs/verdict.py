@@ -137,6 +137,11 @@ def no_pose(i: int, j: int, reason: str) -> PairResult:
     )
 
 
+def not_compared(i: int, j: int, reason: str) -> PairResult:
+    """The result of a pair of scans i < j of which nothing was asked."""
+    return replace(no_pose(i, j, reason), is_searched=False, is_compared=False)
+
+
 def _kind(
     alternatives: tuple[Alternative, ...],
     sliding: Slippage | None,

@@ -173,12 +173,13 @@ def _scan_report(
 
 def _overlap(k: int, judge: Judge, graph: ViewGraph) -> float:
     """Largest share of a scan's samples that agree with one other scan of its component."""
-    poses = next(c.poses for c in graph.components if k in c.poses)
+    home = next(c for c in graph.components if k in c.poses)
+    poses = home.poses
     shares = [
         two_way_evidence(
             judge.fields[k], judge.fields[m], poses[k].inverse() @ poses[m], judge.tolerance
         )[0].agree
-        for m in _others(poses, k)
+        for m in sorted({a + b - k for a, b in graph.compared(home) if k in (a, b)})
     ]
     return max(shares, default=0.0)
 

@@ -32,8 +32,11 @@ def published_method(scene: Scene, config: Config) -> Method:
         """Unlike in the robust method nothing is refined while components grow."""
         return poses
 
-    def refine(poses: Mapping[int, Pose], edges: Sequence[Edge]) -> Refined:
-        aligned = mm_icc(scene.intake.prepared, poses, edges, config.contours)
+    def refine(
+        poses: Mapping[int, Pose], accepted: Sequence[Edge], compared: Sequence[Edge]
+    ) -> Refined:
+        del compared
+        aligned = mm_icc(scene.intake.prepared, poses, accepted, config.contours)
         return {**poses, **aligned.poses}, {}
 
     return Method(

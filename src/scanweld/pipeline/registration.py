@@ -11,15 +11,20 @@ from itertools import combinations
 from scanweld.config import Config
 from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
+from scanweld.graph.partners import partners
 from scanweld.graph.tree import clear_components
 from scanweld.graph.view_graph import Edge
 from scanweld.heat.features import Features, describe
 from scanweld.knowledge.turntable import Turntable, find_turntable
 from scanweld.pairs.quick import is_clear
 from scanweld.pairs.result import PairResult
-from scanweld.pipeline.method import Method, Scene
+from scanweld.pairs.verdict import not_compared
+from scanweld.pipeline.choice import first_pairs, pairs_across, pairs_beside, pairs_left
+from scanweld.pipeline.method import Method, Scene, Shortcuts
 from scanweld.pipeline.problem import graph_problem, same_pose
 from scanweld.work.stage_log import Stages, work_key
+
+NOT_COMPARED = "not compared: both scans are placed, or refused, by others"
 
 Pairs = Mapping[Edge, PairResult]
 
@@ -41,16 +46,17 @@ class Registered:
 
 def register_pairs(scene: Scene, method: Method, config: Config, stages: Stages) -> Registered:
     """Register every pair of scans, and judge what two scans alone say."""
-    edges = list(combinations(range(len(scene.intake.prepared)), 2))
     with stages.stage("pairs") as counts:
-        counts["pairs"] = len(edges)
-        found, components = _clear(scene, edges, method, config, stages)
-        home = {k: n for n, poses in enumerate(components) for k in poses}
-        open_ones = [e for e in edges if e[0] not in home or home[e[0]] != home.get(e[1])]
-        counts["searched"] = len(open_ones)
-        scene, thorough = _searched(scene, open_ones, method, config, stages)
-    found = dict(sorted({**found, **thorough}.items()))
-    return Registered(scene=scene, pairs=found, components=components)
+        quick, components = _clear(scene, method, config, stages)
+        asked = _asked(scene, quick, components, method.shortcuts, stages)
+        across = pairs_across(len(scene.intake.prepared), components, quick)
+        scene, searched = _searched(scene, across, method, config, stages)
+        found = {**quick, **asked, **searched}
+        counts["quickly searched"] = len(quick)
+        counts["searched"] = len(searched)
+    edges = combinations(range(len(scene.intake.prepared)), 2)
+    pairs = {edge: found.get(edge) or not_compared(*edge, NOT_COMPARED) for edge in edges}
+    return Registered(scene=scene, pairs=pairs, components=components)
 
 
 def common_axis(scene: Scene, found: Pairs, config: Config) -> Turntable | None:
@@ -66,29 +72,47 @@ def common_axis(scene: Scene, found: Pairs, config: Config) -> Turntable | None:
 
 
 def _clear(
-    scene: Scene, edges: Sequence[Edge], method: Method, config: Config, stages: Stages
-) -> tuple[Pairs, Sequence[Poses]]:
-    """Pairs within the components that clear pairs make, and these components."""
+    scene: Scene, method: Method, config: Config, stages: Stages
+) -> tuple[dict[Edge, PairResult], Sequence[Poses]]:
+    """What quick searches found of pairs, and the components that clear ones make."""
     shortcuts = method.shortcuts
     if shortcuts is None:
         return {}, ()
-    quick = _kept("quick", scene, edges, method, stages, shortcuts.search_quickly)
-    axis = common_axis(scene, quick, config)
-    problem = graph_problem(scene, quick, axis, method, config)
-    clear = [edge for edge, pair in problem.pairs.items() if is_clear(pair, config.pairs)]
-    components = clear_components(problem, clear)
-    within = [
-        (edge, poses[edge[0]].inverse() @ poses[edge[1]])
+    found: dict[Edge, PairResult] = {}
+    components: Sequence[Poses] = ()
+    for choose in (first_pairs, pairs_beside, pairs_left):
+        edges = [e for e in choose(len(scene.intake.prepared), components) if e not in found]
+        if not edges:
+            continue
+        found.update(_kept("quick", scene, edges, method, stages, shortcuts.search_quickly))
+        axis = common_axis(scene, found, config)
+        problem = graph_problem(scene, found, axis, method, config)
+        clear = [edge for edge, pair in problem.pairs.items() if is_clear(pair, config.pairs)]
+        components = clear_components(problem, clear)
+    return found, components
+
+
+def _asked(
+    scene: Scene,
+    found: Pairs,
+    components: Sequence[Poses],
+    shortcuts: Shortcuts | None,
+    stages: Stages,
+) -> dict[Edge, PairResult]:
+    """Pairs within components at the pose that follows; what there is no need to ask is left."""
+    if shortcuts is None:
+        return {}
+    within = {
+        edge: poses[edge[0]].inverse() @ poses[edge[1]]
         for poses in components
-        for edge in combinations(sorted(poses), 2)
-    ]
+        for edge in {*partners(poses, scene.judge), *(e for e in found if set(e) <= set(poses))}
+    }
 
-    def ask(item: tuple[Edge, Pose]) -> PairResult:
-        edge, i_from_j = item
-        return shortcuts.ask(edge, i_from_j, quick[edge])
+    def ask(edge: Edge) -> PairResult:
+        return shortcuts.ask(edge, within[edge], found.get(edge))
 
-    asked = stages.each("pairs", ask, within)
-    return {edge: pair for (edge, _), pair in zip(within, asked, strict=True)}, components
+    edges = sorted(within)
+    return dict(zip(edges, stages.each("pairs", ask, edges), strict=True))
 
 
 def _searched(

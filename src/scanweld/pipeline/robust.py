@@ -6,6 +6,7 @@ from scanweld.config import Config
 from scanweld.contours.coherence import contour_matcher
 from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
+from scanweld.graph.partners import partners
 from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
 from scanweld.pairs.registrar import PairRegistrar
@@ -30,10 +31,13 @@ def robust_method(scene: Scene, config: Config) -> Method:
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
     def settle(poses: Poses) -> Poses:
-        return refine_poses(scans, poses, [], settling).poses
+        return refine_poses(scans, poses, partners(poses, scene.judge), settling).poses
 
-    def refine(poses: Mapping[int, Pose], edges: Sequence[Edge]) -> Refined:
-        refined = refine_poses(scans, poses, edges, config.refine, contours)
+    def refine(
+        poses: Mapping[int, Pose], accepted: Sequence[Edge], compared: Sequence[Edge]
+    ) -> Refined:
+        del accepted
+        refined = refine_poses(scans, poses, compared, config.refine, contours)
         return refined.poses, scan_rms(refined)
 
     return Method(

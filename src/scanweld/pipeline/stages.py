@@ -15,7 +15,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.graph.assemble import build_view_graph
 from scanweld.graph.reasons import doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
-from scanweld.graph.view_graph import ViewGraph
+from scanweld.graph.view_graph import Component, ViewGraph
 from scanweld.knowledge import check
 from scanweld.knowledge.turntable import Turntable, off_axis_doubts
 from scanweld.knowledge.usable_pairs import with_found_pairs
@@ -24,7 +24,7 @@ from scanweld.pipeline.method import Method, Scene
 from scanweld.pipeline.problem import graph_problem
 from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
-from scanweld.refinement.scale import estimate_scales
+from scanweld.refinement.scale import ScaleEstimate, estimate_scales
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
 
@@ -102,9 +102,13 @@ def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:
     return {
         k: estimate.words()
         for component in graph.components
-        for k, estimate in estimate_scales(intake.prepared, component.poses).items()
+        for k, estimate in _scales(intake, graph, component).items()
         if estimate.is_off
     }
+
+
+def _scales(intake: Intake, graph: ViewGraph, component: Component) -> dict[int, ScaleEstimate]:
+    return estimate_scales(intake.prepared, component.poses, graph.compared(component))
 
 
 def assess_placed(

@@ -10,6 +10,9 @@ from scanweld.geometry.gauss_newton import damped, jacobian, motion_of, spread_o
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 
+MIN_MATCHES = 20
+"""A pair takes part in each direction in which it has at least so many matches."""
+
 Found = tuple[int, int, Matches]
 """Matches of scan i on scan j, in the sensor frame of j."""
 

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
@@ -12,15 +11,14 @@ from scanweld.contours.coherence import OUTLINE_NOISE_PIXELS, ContourMatcher
 from scanweld.geometry.gauss_newton import lever_arm
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.refinement.least_squares import Found, Term, move_poses, weighted_terms
+from scanweld.refinement.contour_terms import Outlines
+from scanweld.refinement.least_squares import MIN_MATCHES, Found, Term, move_poses, weighted_terms
 from scanweld.refinement.surface_terms import SurfaceSource, surface_matches, surface_source
 
 logger = logging.getLogger(__name__)
 
 NUM_POINTS = 4000
 """Surface points of a scan that are matched."""
-MIN_MATCHES = 20
-"""A pair takes part in each direction in which it has at least so many matches."""
 SURFACE_NOISE_DIAMETERS = 1e-7
 """Least spread of surface residuals: exact data have none."""
 MAX_STEP_DIAMETERS = 0.1
@@ -68,15 +66,15 @@ def refine_poses(
 ) -> Refinement:
     """Refine all poses together by surface and contour matches.
 
-    Surfaces are matched between all scans that overlap at the current poses, point to plane and
+    Surfaces are matched between all given pairs that touch at the current poses, point to plane and
     in both directions, within a radius that shrinks from round to round. Contours are matched in
-    the last rounds, between those of the given pairs whose surfaces touch: alone they hold a
-    pair too weakly. The first scan stays where it is.
+    the last rounds, between scans that share much surface: alone they hold a pair too weakly. The
+    first scan stays where it is.
 
     Args:
         scans: All scans.
         world_from_sensor: Start poses of those to refine, by index in ``scans``.
-        pairs: Adjacent views, whose contours are matched.
+        pairs: Scans that are matched, (i, j) in any order.
         config: Rounds, radii and the weight of the contours.
         contours: Of all scans; without them there is no contour term.
     """
@@ -88,19 +86,18 @@ def refine_poses(
     pixel = float(np.median([scans[k].image.pixel for k in poses]))
     noise = SURFACE_NOISE_DIAMETERS * diameter, OUTLINE_NOISE_PIXELS * pixel
     contour_rounds = NUM_CONTOUR_ROUNDS if config.contour_weight > 0 else 0
-    views = {(min(pair), max(pair)) for pair in pairs}
+    outlines = None if contours is None else Outlines(contours=contours)
     step = 0.0
     for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
-        surface = match_surfaces(sources, poses, float(radius) * diameter)
-        outlines: list[Found] = []
-        if contours is not None and n >= config.num_rounds - contour_rounds:
-            touching = {(min(i, j), max(i, j)) for i, j, _ in surface}
-            outlines = _match_contours(poses, sorted(touching & views), contours)
-        terms = weighted_terms(surface, outlines, poses, config.contour_weight, noise)
+        surface = match_surfaces(sources, poses, pairs, float(radius) * diameter)
+        contour: list[Found] = []
+        if outlines is not None and n >= config.num_rounds - contour_rounds:
+            contour = outlines.matches(poses, surface)
+        terms = weighted_terms(surface, contour, poses, config.contour_weight, noise)
         poses, moved = move_poses(terms, poses, lever_arm(diameter), MAX_STEP_DIAMETERS * diameter)
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
-    surface = match_surfaces(sources, poses, config.match_diameters[1] * diameter)
+    surface = match_surfaces(sources, poses, pairs, config.match_diameters[1] * diameter)
     terms = weighted_terms(surface, [], poses, 0.0, noise)
     rms = _rms(terms)
     logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
@@ -119,28 +116,17 @@ def scan_rms(refinement: Refinement) -> dict[int, float]:
 
 
 def match_surfaces(
-    sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], radius: float
+    sources: Mapping[int, SurfaceSource],
+    poses: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
+    radius: float,
 ) -> list[Found]:
-    """Point-to-plane matches between all scans that touch at their poses, in both directions."""
+    """Point-to-plane matches of the pairs that touch at their poses, in both directions."""
     found = []
-    for i, j in permutations(poses, 2):
+    for i, j in sorted({*pairs, *((j, i) for i, j in pairs)}):
         matches = surface_matches(sources[i], sources[j], poses[j].inverse() @ poses[i], radius)
         if len(matches) >= MIN_MATCHES:
             found.append((i, j, matches))
-    return found
-
-
-def _match_contours(
-    poses: Mapping[int, Pose],
-    views: Sequence[tuple[int, int]],
-    contours: ContourMatcher,
-) -> list[Found]:
-    found = []
-    for pair in views:
-        for i, j in (pair, pair[::-1]):
-            matches = contours.matches(i, j, poses[j].inverse() @ poses[i])
-            if len(matches) >= MIN_MATCHES:
-                found.append((i, j, matches))
     return found
 
 

@@ -1,6 +1,6 @@
 """Scans whose unit is a little off: the scales that would make the placed surfaces agree."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,13 +59,16 @@ class ScaleEstimate:
 
 
 def estimate_scales(
-    scans: Sequence[PreparedScan], world_from_sensor: Mapping[int, Pose]
+    scans: Sequence[PreparedScan],
+    world_from_sensor: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
 ) -> dict[int, ScaleEstimate]:
     """Free the scale of every placed scan beside its pose, in a few steps of least squares.
 
     Args:
         scans: All scans.
         world_from_sensor: Refined poses of a component's, by index in ``scans``.
+        pairs: Scans that are matched, (i, j) in any order.
 
     Returns:
         Estimates of the scans whose surfaces touch others', by index.
@@ -79,7 +82,7 @@ def estimate_scales(
     order: list[int] = []
     for _ in range(NUM_ROUNDS):
         grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
-        terms = _surface_terms(grown, poses, diameter)
+        terms = _surface_terms(grown, poses, pairs, diameter)
         order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
         if len(order) < 2:
             return {}
@@ -112,9 +115,12 @@ def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:
 
 
 def _surface_terms(
-    sources: Mapping[int, SurfaceSource], poses: Mapping[int, Pose], diameter: float
+    sources: Mapping[int, SurfaceSource],
+    poses: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
+    diameter: float,
 ) -> list[Term]:
-    found = match_surfaces(sources, poses, MATCH_DIAMETERS * diameter)
+    found = match_surfaces(sources, poses, pairs, MATCH_DIAMETERS * diameter)
     noise = SURFACE_NOISE_DIAMETERS * diameter, 1.0
     return weighted_terms(found, [], poses, 0.0, noise)
 
