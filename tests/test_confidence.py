@@ -22,6 +22,7 @@ from scanweld.confidence.model import (
 )
 from scanweld.confidence.ties import ties_of
 from scanweld.config import Config, FusionConfig
+from scanweld.contours.coherence import contour_matcher
 from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose, rotation_exp
@@ -188,7 +189,7 @@ def test_pairs_conduct_like_wires(monkeypatch: pytest.MonkeyPatch):
     diagnostics = PairDiagnostics(
         judge=replace(pair.judge(), fields=pair.fields + pair.fields),
         sources=[],
-        cohere=lambda i, j, i_from_j: 1.0,
+        contours=contour_matcher(pair.scans, CONFIG.contours),
     )
     joint = joint_evidence(graph, component, diagnostics)
     assert joint.conductance[0, 1] == pytest.approx(0.7, abs=1e-3)

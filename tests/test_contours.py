@@ -235,7 +235,8 @@ def test_wrong_poses_do_not_cohere():
     right, _ = aligned_pair(pair, pair.i_from_j)
     wrong, _ = aligned_pair(pair, nudged(pair, 120.0))
     assert wrong.coherence < 0.6 * right.coherence
-    matches = contour_matcher(pair.scans, CONFIG).matches(0, 1, pair.i_from_j.inverse())
+    matcher = contour_matcher(pair.scans, CONFIG)
+    matches = matcher.matches(1, matcher.pair(0, 1, pair.i_from_j.inverse()))
     pixel = pair.scans[1].image.pixel
     assert len(matches) > 20
     assert np.abs(matches.residuals).max() <= 4 * pixel

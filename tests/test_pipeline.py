@@ -123,7 +123,7 @@ def test_all_scans_are_placed_exactly_and_the_report_names_every_pair():
             assert pair.i in result.scans[pair.j].edges
         else:
             assert pair.reason
-    assert {"prepare", "features", "pairs", "graph", "refine", "fuse"} <= set(result.stages)
+    assert {"prepare", "pairs", "graph", "refine", "fuse"} <= set(result.stages)
     assert all(stage.counts for stage in result.stages.values())
 
 
@@ -143,13 +143,13 @@ def test_workers_order_and_names_do_not_change_a_byte():
 @pytest.mark.slow
 def test_one_more_scan_redoes_no_pair_that_it_is_not_in(monkeypatch: pytest.MonkeyPatch):
     scans, memory, edges = few(), Memory(), []
-    register = registrar.register_pair
+    register = registrar.search_quickly
 
     def counted(problem: PairProblem, *arguments: Any) -> PairResult:
         edges.append(problem.edge)
         return register(problem, *arguments)
 
-    monkeypatch.setattr(registrar, "register_pair", counted)
+    monkeypatch.setattr(registrar, "search_quickly", counted)
     run(scans[:3], cache=memory)
     assert len(edges) == 3
     run(scans, cache=memory)
@@ -166,6 +166,7 @@ def test_a_second_run_recomputes_nothing(monkeypatch: pytest.MonkeyPatch):
         pytest.fail("a pair was registered again")
 
     monkeypatch.setattr(registrar, "register_pair", refuse)
+    monkeypatch.setattr(registrar, "search_quickly", refuse)
     second = run(scans[::-1], cache=memory)
     assert memory.num_put == kept
     assert bytes_of(first) == bytes_of(second)

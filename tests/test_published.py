@@ -63,7 +63,7 @@ def test_evidence_at_the_start_repairs_it():
     assert result.verdict is Verdict.GOOD
     errors = errors_of(result, scene().world_from_scan, three())
     assert errors.count(Standing.RIGHT) == 3
-    assert {"features", "pairs", "graph", "refine", "fuse"} <= set(result.stages)
+    assert {"features", "search", "graph", "refine", "fuse"} <= set(result.stages)
 
 
 def test_a_symmetric_object_is_not_good():

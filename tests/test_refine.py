@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.graph.refine_graph import Refined, refine_graph
-from scanweld.graph.view_graph import Component, ViewGraph
+from scanweld.graph.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import Alternative
 from scanweld.preparation import prepare
 from scanweld.refinement.refine import Refinement, refine_poses, scan_rms
@@ -113,9 +114,10 @@ def test_numbering_of_the_scans_does_not_matter():
     scans, _ = ring()
     poses = start(1.0, 0.01)
     order = [3, 0, 5, 1, 4, 2]
-    a = refine_poses(scans, poses, RING, RefineConfig()).poses
+    all_pairs = list(combinations(range(NUM_SCANS), 2))
+    a = refine_poses(scans, poses, all_pairs, RefineConfig()).poses
     shuffled = {n: poses[k] for n, k in enumerate(order)}
-    b = refine_poses([scans[k] for k in order], shuffled, [], RefineConfig()).poses
+    b = refine_poses([scans[k] for k in order], shuffled, all_pairs, RefineConfig()).poses
     gauge = a[order[0]] @ b[0].inverse()
     for n, k in enumerate(order):
         off = a[k].inverse() @ gauge @ b[n]
@@ -223,7 +225,7 @@ def test_a_refinement_is_taken_only_if_the_evidence_does_not_suffer(is_better: b
 
     matcher = contour_matcher(scans, ContoursConfig())
 
-    def refine(poses: Mapping[int, Pose], edges: Sequence[tuple[int, int]]) -> Refined:
+    def refine(poses: Mapping[int, Pose], edges: Sequence[Edge], _: Sequence[Edge]) -> Refined:
         found = refine_poses(scans, poses, edges, RefineConfig(), matcher)
         return found.poses, scan_rms(found)
 

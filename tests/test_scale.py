@@ -1,6 +1,7 @@
 """Scans whose unit is a little off are found, and by how much; the others are not blamed."""
 
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def placed(factor: float, unit: float = 1.0) -> tuple[list[PreparedScan], dict[i
 
 def estimates(factor: float, unit: float = 1.0) -> dict[int, ScaleEstimate]:
     scans, poses = placed(factor, unit)
-    return estimate_scales(scans, poses)
+    return estimate_scales(scans, poses, list(combinations(poses, 2)))
 
 
 @pytest.mark.parametrize("factor", [1.015, 0.985, 1.02])
@@ -71,7 +72,7 @@ def test_scans_that_touch_nothing_have_no_scale():
         k: Pose(rotation=pose.rotation, translation=pose.translation + 1e4 * k)
         for k, pose in poses.items()
     }
-    assert estimate_scales(scans, apart) == {}
+    assert estimate_scales(scans, apart, list(combinations(apart, 2))) == {}
 
 
 def test_an_uncertain_scale_is_no_accusation():

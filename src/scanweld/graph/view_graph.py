@@ -60,7 +60,7 @@ class ViewGraph:
     def compared(self, component: Component) -> list[Edge]:
         """Pairs (i, j), i < j, of a component's scans of which something was asked, in order."""
         inside = combinations(sorted(component.poses), 2)
-        return [edge for edge in inside if self.pairs[edge].is_compared]
+        return [e for e in inside if e not in self.pairs or self.pairs[e].is_compared]
 
     def neighbours(self, scan: int) -> tuple[int, ...]:
         """Scans that share an accepted pair with one, in order."""

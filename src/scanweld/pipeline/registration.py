@@ -14,7 +14,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.graph.partners import partners
 from scanweld.graph.tree import clear_components
 from scanweld.graph.view_graph import Edge
-from scanweld.heat.features import Features, describe
+from scanweld.heat.features import describe
 from scanweld.knowledge.turntable import Turntable, find_turntable
 from scanweld.pairs.quick import is_clear
 from scanweld.pairs.result import PairResult
@@ -46,15 +46,24 @@ class Registered:
 
 def register_pairs(scene: Scene, method: Method, config: Config, stages: Stages) -> Registered:
     """Register every pair of scans, and judge what two scans alone say."""
-    with stages.stage("pairs") as counts:
-        quick, components = _clear(scene, method, config, stages)
-        asked = _asked(scene, quick, components, method.shortcuts, stages)
-        across = pairs_across(len(scene.intake.prepared), components, quick)
-        scene, searched = _searched(scene, across, method, config, stages)
-        found = {**quick, **asked, **searched}
-        counts["quickly searched"] = len(quick)
-        counts["searched"] = len(searched)
-    edges = combinations(range(len(scene.intake.prepared)), 2)
+    num_scans = len(scene.intake.prepared)
+    found: dict[Edge, PairResult] = {}
+    asked: dict[Edge, PairResult] = {}
+    components: Sequence[Poses] = ()
+    if method.shortcuts is not None:
+        with stages.stage("pairs") as counts:
+            found, components = _clear(scene, method, config, stages)
+            counts["pairs"] = len(found)
+            asked = _asked(scene, found, components, method.shortcuts, stages)
+            counts["placed"] = sum(len(poses) for poses in components)
+    across = pairs_across(num_scans, components, found)
+    found.update(asked)
+    if across:
+        scene = _described(scene, across, method, config, stages)
+        with stages.stage("search") as counts:
+            counts["pairs"] = len(across)
+            found.update(_searched(scene, across, method, stages))
+    edges = combinations(range(num_scans), 2)
     pairs = {edge: found.get(edge) or not_compared(*edge, NOT_COMPARED) for edge in edges}
     return Registered(scene=scene, pairs=pairs, components=components)
 
@@ -75,16 +84,14 @@ def _clear(
     scene: Scene, method: Method, config: Config, stages: Stages
 ) -> tuple[dict[Edge, PairResult], Sequence[Poses]]:
     """What quick searches found of pairs, and the components that clear ones make."""
-    shortcuts = method.shortcuts
-    if shortcuts is None:
-        return {}, ()
+    assert method.shortcuts is not None
     found: dict[Edge, PairResult] = {}
     components: Sequence[Poses] = ()
     for choose in (first_pairs, pairs_beside, pairs_left):
         edges = [e for e in choose(len(scene.intake.prepared), components) if e not in found]
         if not edges:
             continue
-        found.update(_kept("quick", scene, edges, method, stages, shortcuts.search_quickly))
+        found.update(_kept("pairs", scene, edges, method, stages, method.shortcuts.search_quickly))
         axis = common_axis(scene, found, config)
         problem = graph_problem(scene, found, axis, method, config)
         clear = [edge for edge, pair in problem.pairs.items() if is_clear(pair, config.pairs)]
@@ -96,12 +103,10 @@ def _asked(
     scene: Scene,
     found: Pairs,
     components: Sequence[Poses],
-    shortcuts: Shortcuts | None,
+    shortcuts: Shortcuts,
     stages: Stages,
 ) -> dict[Edge, PairResult]:
     """Pairs within components at the pose that follows; what there is no need to ask is left."""
-    if shortcuts is None:
-        return {}
     within = {
         edge: poses[edge[0]].inverse() @ poses[edge[1]]
         for poses in components
@@ -115,36 +120,34 @@ def _asked(
     return dict(zip(edges, stages.each("pairs", ask, edges), strict=True))
 
 
-def _searched(
+def _described(
     scene: Scene, edges: Sequence[Edge], method: Method, config: Config, stages: Stages
-) -> tuple[Scene, Pairs]:
-    """The scene with the keypoints of the scans that are searched thoroughly, and their pairs."""
-    if method.needs_features:
-        scene = replace(scene, features=_described(scene, edges, config, stages))
+) -> Scene:
+    """The scene with the PA-HKS keypoints of the scans of some pairs (paper 3.1), if needed."""
+    if not method.needs_features:
+        return scene
+    scans = sorted({k for edge in edges for k in edge})
+    prepared = scene.intake.prepared
+    with stages.stage("features") as counts:
+        found = stages.each(
+            "features",
+            lambda k: describe(prepared[k], config.heat),
+            scans,
+            lambda k: work_key("features", prepared[k].work_hash, config.prepare, config.heat),
+        )
+        counts["keypoints"] = sum(len(features.points) for features in found)
+    return replace(scene, features=dict(zip(scans, found, strict=True)))
 
+
+def _searched(scene: Scene, edges: Sequence[Edge], method: Method, stages: Stages) -> Pairs:
     def register(edge: Edge) -> PairResult:
         return method.register(edge, scene.features)
 
-    return scene, _kept("pair", scene, edges, method, stages, register)
-
-
-def _described(
-    scene: Scene, edges: Sequence[Edge], config: Config, stages: Stages
-) -> dict[int, Features]:
-    """PA-HKS keypoints of the scans of some pairs (paper 3.1)."""
-    scans = sorted({k for edge in edges for k in edge})
-    prepared = scene.intake.prepared
-    found = stages.each(
-        "pairs",
-        lambda k: describe(prepared[k], config.heat),
-        scans,
-        lambda k: work_key("features", prepared[k].work_hash, config.prepare, config.heat),
-    )
-    return dict(zip(scans, found, strict=True))
+    return _kept("search", scene, edges, method, stages, register)
 
 
 def _kept(
-    what: str,
+    stage: str,
     scene: Scene,
     edges: Sequence[Edge],
     method: Method,
@@ -157,10 +160,10 @@ def _kept(
     def key(edge: Edge) -> str:
         hashes = [intake.prepared[k].work_hash for k in edge]
         return work_key(
-            f"{method.name} {what}", *hashes, *method.settings, *intake.known.start_key(edge)
+            f"{method.name} {stage}", *hashes, *method.settings, *intake.known.start_key(edge)
         )
 
-    results = stages.each("pairs", register, edges, key)
+    results = stages.each(stage, register, edges, key)
     return {
         edge: replace(result, i=edge[0], j=edge[1])
         for edge, result in zip(edges, results, strict=True)
