@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from benchmarks.paper.study import Record
+from benchmarks.paper.success import auc
 
 from benchmarks.calibration.collect import NUM_SETS, Sets
 from benchmarks.calibration.fit import count_frequencies, fit, held_out_probabilities, make_examples
@@ -13,8 +15,6 @@ from benchmarks.calibration.solids import ODDS, SOLIDS, make_solid
 from benchmarks.judging.measures import calibration_error
 from benchmarks.judging.rivals import Rivals
 from benchmarks.judging.table import Runs
-from benchmarks.paper.study import Record
-from benchmarks.paper.success import auc
 from benchmarks.virtual.strangers import LIKE
 from scanweld.confidence.model import read_calibration
 from scanweld.geometry.arrays import BoolArray, FloatArray

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.paper.study import Record, Study
 
 from benchmarks import trust as command
 from benchmarks.judging import floors as floors_module
@@ -24,7 +25,6 @@ from benchmarks.judging.page import Results, page_text
 from benchmarks.judging.table import FIRST_SEED, Runs, outcomes_of
 from benchmarks.judging.tables import floor_table, kind_table, misses, scenario_table
 from benchmarks.judging.trial import Outcome, PairOutcome, ScanOutcome, judge, try_out
-from benchmarks.paper.study import Record, Study
 from benchmarks.sets import SETS
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Scene, make_scene

@@ -89,7 +89,10 @@ def _from_any_start(records: Records) -> dict[str, str]:
         return told + (f" and {RIGHT.count(answers(far, method))}" if far else "")
 
     others = [m for m in METHODS if m not in ("default", *LIMIT_OF) and answers(records, m)]
-    told = {"default": counts("default", f" pairs to {NEAR_GAP}°") + (" beyond" if far else "")}
+    told = {
+        "default": counts("default", f" pairs to {NEAR_GAP}°") + (" beyond" if far else ""),
+        "best": "",
+    }
     if others:
         best = max(others, key=lambda method: share_right(answers(records, method), RIGHT))
         told |= {"best": METHODS[best].title, "best_count": counts(best, "")}

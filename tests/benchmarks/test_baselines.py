@@ -1,17 +1,16 @@
 """The methods of the paper study: each recovers an easy pair, the right way round."""
 
 import sys
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.paper.baselines.clouds import cloud_pair
 from benchmarks.paper.baselines.cpd import cpd
-from benchmarks.paper.methods import METHODS, Answer, Entry, ScanPair, method
-from benchmarks.paper.optional import need
+from benchmarks.paper.baselines.records import Answer, ScanPair, cloud_pair
+from benchmarks.paper.methods import METHODS, Entry, method
+from benchmarks.study.optional import is_usable, need
 from scanweld.errors import InputError
 from scanweld.geometry.pose import Pose, random_rotation
 from tests.prepared import PreparedPair, creature_pair
@@ -23,19 +22,19 @@ WITHIN_ELSE = (0.5, 0.003)
 BOTH_OF_THE_PAPER = ("paper-coarse", "paper")
 """Their descriptor does not recover this pair; what they find is looked at below."""
 
-from_start = pytest.mark.parametrize("name", [e.name for e in METHODS.values() if e.uses_start])
+from_start = pytest.mark.parametrize("name", [n for n, e in METHODS.items() if e.uses_start])
 from_anywhere = pytest.mark.parametrize(
     "name",
-    [e.name for e in METHODS.values() if not e.uses_start and e.name not in BOTH_OF_THE_PAPER],
+    [n for n, e in METHODS.items() if not e.uses_start and n not in BOTH_OF_THE_PAPER],
 )
 
 
 def installed(name: str) -> Entry:
     """The method, or a skip where a library that it needs is not there."""
     entry = method(name)
-    missing = [module for module in entry.needs if find_spec(module) is None]
+    missing = [module for module in entry.needs if not is_usable(module)]
     if missing:
-        pytest.skip(f"{', '.join(missing)} not installed: pip install 'scanweld[bench]'")
+        pytest.skip(f"{', '.join(missing)} cannot be used here: pip install 'scanweld[bench]'")
     return entry
 
 
@@ -122,7 +121,7 @@ def test_clouds_move_as_the_sensor_frames_do(seed: int):
     matrix = clouds.matrix_of(i_from_j)
     back = clouds.pose_of(matrix)
     np.testing.assert_allclose(back.matrix(), i_from_j.matrix(), atol=1e-9)
-    moved = clouds.j.points[:5] @ matrix[:3, :3].T + matrix[:3, 3]
+    moved = clouds.points[1][:5] @ matrix[:3, :3].T + matrix[:3, 3]
     truly = i_from_j.apply(pair.scans[1].mesh.vertices[:5])
     np.testing.assert_allclose(moved * pair.diameter + clouds.middles[0], truly, atol=1e-9)
 
@@ -153,7 +152,7 @@ def test_a_library_that_does_not_load_is_not_called_missing(monkeypatch: pytest.
     def fail(name: str) -> None:
         raise ImportError("libusb-1.0.so.0: cannot open shared object file")
 
-    monkeypatch.setattr("benchmarks.paper.optional.import_module", fail)
+    monkeypatch.setattr("benchmarks.study.optional.import_module", fail)
     with pytest.raises(InputError, match=r"^open3d cannot be loaded \(libusb.*system's packages$"):
         need("open3d")
 

@@ -18,11 +18,11 @@ from benchmarks.features.si_hks import octave_times, si_heat_signature
 from benchmarks.features.spectrum import Spectrum, spectrum_of, values_at
 from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
 from benchmarks.paper import features
-from benchmarks.paper.baselines import feature_views
 from benchmarks.paper.baselines.feature_views import DESCRIPTORS, DETECTORS
 from benchmarks.paper.features import QUESTIONS, answer
-from benchmarks.paper.optional import need
-from benchmarks.paper.study import Record
+from benchmarks.paper.pages import write_page
+from benchmarks.study.optional import need
+from benchmarks.study.study import Record
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
@@ -265,7 +265,8 @@ def test_features_are_measured_and_told(tmp_path: Path):
         assert tuple(result[group]) == DESCRIPTORS
     right, asked, chance = result["even"]["HKS, full mesh"]["nearest"]
     assert right / asked > 0.4 > 4 * chance / asked
-    told = features.page([Record(unit=unit, result=result)], tmp_path)
+    write_page("features", [Record(unit=unit, result=result)], tmp_path, quick=True)
+    told = (tmp_path / "features.md").read_text(encoding="utf-8")
     assert "| PA-HKS |" in told and "## Creature" in told
     assert (tmp_path / "features.png").stat().st_size > 10_000
 
@@ -274,9 +275,10 @@ def test_a_row_without_its_library_says_so(tmp_path: Path, monkeypatch: pytest.M
     def fail(module: str) -> None:
         raise InputError(f"{module} is missing")
 
-    monkeypatch.setattr(feature_views, "need", fail)
+    monkeypatch.setattr("benchmarks.paper.baselines.fpfh.need", fail)
     unit = features.units(quick=True)[0]
     result = features.measure(unit)
     assert result["own"]["FPFH"] == {"missing": "open3d is missing"}
-    told = features.page([Record(unit=unit, result=result)], tmp_path)
+    write_page("features", [Record(unit=unit, result=result)], tmp_path, quick=True)
+    told = (tmp_path / "features.md").read_text(encoding="utf-8")
     assert "| FPFH | open3d is missing |" in told
