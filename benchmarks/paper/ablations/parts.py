@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from benchmarks.paper.ablations import search
+from benchmarks.paper.ablations.search import measure as measure_search
 from benchmarks.paper.baselines.feature_views import is_seen
 from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined
 from benchmarks.paper.views import VirtualPair, overlap_of
@@ -226,7 +226,7 @@ PARTS = {
     "heat": Part(measure=measure_heat, gaps=(30, 60, 90), azimuths=QUARTERS),
     "coarse": Part(measure=measure_coarse, gaps=(10, 30, 50, 70, 90), azimuths=QUARTERS),
     "search": Part(
-        measure=search.measure, gaps=(90, 100, 110, 120), azimuths=EIGHTHS, quick_gap=90
+        measure=measure_search, gaps=(90, 100, 110, 120), azimuths=EIGHTHS, quick_gap=90
     ),
 }
 """In the order in which they are measured and shown."""
