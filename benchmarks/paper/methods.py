@@ -1,72 +1,68 @@
-"""All methods of the study by name."""
+"""All methods of the study by name, and what they make of a pair whose truth is known."""
 
+import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from benchmarks.paper.baselines import cpd, fpfh, gicp, kiss, own
-from benchmarks.paper.baselines.records import Answer, Method, ScanPair
+from benchmarks.paper.baselines.records import Method, ScanPair
+from benchmarks.paper.views import pose_error
+from benchmarks.study.optional import is_usable, need
+from benchmarks.study.plots import Curve
 from scanweld.errors import InputError
+from scanweld.geometry.pose import Pose
 
-__all__ = ["METHODS", "Answer", "Entry", "Method", "ScanPair", "method"]
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """A method of the study.
 
     Attributes:
-        name: By which tables and their JSON call it.
         title: For people.
         run: The method.
+        color: Of its curves: the project's own are strong, what needs a start is grey.
         uses_start: Whether it starts at the given pose; else the pose makes no difference.
         needs: Modules of the extra ``bench`` that it imports.
     """
 
-    name: str
     title: str
     run: Method
-    uses_start: bool
+    color: str
+    uses_start: bool = False
     needs: tuple[str, ...] = ()
 
 
-_ENTRIES = (
-    Entry(name="icp", title="ICP", run=own.icp, uses_start=True),
-    Entry(name="trimmed-icp", title="trimmed ICP", run=own.trimmed_icp, uses_start=True),
-    Entry(
-        name="point-to-plane",
-        title="point-to-plane ICP",
-        run=gicp.point_to_plane,
-        uses_start=True,
-        needs=("small_gicp",),
+METHODS: dict[str, Entry] = {
+    "icp": Entry("ICP", own.icp, "#B4B9C1", True),
+    "trimmed-icp": Entry("trimmed ICP", own.trimmed_icp, "#8C929C", True),
+    "point-to-plane": Entry(
+        "point-to-plane ICP", gicp.point_to_plane, "#737880", True, ("small_gicp",)
     ),
-    Entry(name="gicp", title="GICP", run=gicp.gicp, uses_start=True, needs=("small_gicp",)),
-    Entry(name="cpd", title="CPD", run=cpd.cpd, uses_start=True, needs=("pycpd",)),
-    Entry(name="m-icc", title="M-ICC", run=own.m_icc, uses_start=True),
-    Entry(name="mm-icc", title="MM-ICC", run=own.mm_icc, uses_start=True),
-    Entry(
-        name="fpfh-ransac",
-        title="FPFH + RANSAC + ICP",
-        run=fpfh.fpfh_ransac,
-        uses_start=False,
-        needs=("open3d",),
+    "gicp": Entry("GICP", gicp.gicp, "#555B66", True, ("small_gicp",)),
+    "cpd": Entry("CPD", cpd.cpd, "#D5D8DD", True, ("pycpd",)),
+    "m-icc": Entry("M-ICC", own.m_icc, "#E3B04B", True),
+    "mm-icc": Entry("MM-ICC", own.mm_icc, "#B8860B", True),
+    "paper-coarse": Entry("the paper's coarse step", own.paper_coarse, "#E59AAA"),
+    "paper": Entry("the paper's method", own.paper, "#C2274B"),
+    "fpfh-ransac": Entry("FPFH + RANSAC + ICP", fpfh.fpfh_ransac, "#3B7D4F", needs=("open3d",)),
+    "fgr": Entry("FGR + ICP", fpfh.fgr, "#7FB38A", needs=("open3d",)),
+    "kiss-gicp": Entry(
+        "KISS-Matcher + GICP", kiss.kiss_gicp, "#7A4FA3", needs=("kiss_matcher", "small_gicp")
     ),
-    Entry(name="fgr", title="FGR + ICP", run=fpfh.fgr, uses_start=False, needs=("open3d",)),
-    Entry(
-        name="kiss-gicp",
-        title="KISS-Matcher + GICP",
-        run=kiss.kiss_gicp,
-        uses_start=False,
-        needs=("kiss_matcher", "small_gicp"),
-    ),
-    Entry(
-        name="paper-coarse",
-        title="the paper's coarse step",
-        run=own.paper_coarse,
-        uses_start=False,
-    ),
-    Entry(name="paper", title="the paper's method", run=own.paper, uses_start=False),
-    Entry(name="default", title="scanweld", run=own.default, uses_start=False),
-)
-METHODS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
+    "default": Entry("scanweld", own.default, "#1B6CA8"),
+}
+"""In the order in which tables show them."""
+
+
+BY_TITLE = {entry.title: name for name, entry in METHODS.items()}
+_STRONG = ("default", "paper")
+
+
+def curve(name: str, places: Sequence[float], shares: Sequence[float]) -> Curve:
+    """Shares of a method as plots draw them."""
+    color, strong = METHODS[name].color, name in _STRONG
+    return Curve(places=places, shares=shares, color=color, strong=strong)
 
 
 def method(name: str) -> Entry:
@@ -78,3 +74,57 @@ def method(name: str) -> Entry:
     if name not in METHODS:
         raise InputError(f"{name}: no such method; there are {', '.join(METHODS)}")
     return METHODS[name]
+
+
+def try_methods(
+    names: Iterable[str], pair: ScanPair, start: Pose, true: Pose, diameter: float, seed: int
+) -> dict[str, dict[str, Any]]:
+    """Run methods on a pair, one after the other.
+
+    Args:
+        names: Of the methods.
+        pair: The scans.
+        start: Pose i_from_j of those methods that start at one.
+        true: The true i_from_j.
+        diameter: Of the object, for the error.
+        seed: Of those methods that draw random numbers.
+
+    Returns:
+        By name: "deg" and "percent" (of the diameter, at the middle of j) of the error, both None
+        where the method gives no pose; its "score"; whether it was "accepted", where the method
+        says so; and its CPU "seconds".
+    """
+    centre = pair.j.samples.points.mean(axis=0)
+    tried: dict[str, dict[str, Any]] = {}
+    for name in names:
+        began = time.process_time()
+        answer = METHODS[name].run(pair, start, seed)
+        seconds = time.process_time() - began
+        error = pose_error(true, answer.i_from_j, centre, diameter)
+        tried[name] = {**error, "score": answer.score, "seconds": seconds}
+        if answer.accepted is not None:
+            tried[name]["accepted"] = answer.accepted
+    return tried
+
+
+def missing_modules(names: Iterable[str]) -> list[str]:
+    """Modules that the methods of these names need and that cannot be used here."""
+    needed = {module for name in names for module in METHODS[name].needs}
+    return sorted(module for module in needed if not is_usable(module))
+
+
+def without(names: Iterable[str], missing: Iterable[str]) -> list[str]:
+    """The methods that need none of the missing modules."""
+    gone = set(missing)
+    return [name for name in names if not gone.intersection(METHODS[name].needs)]
+
+
+def need_all(names: Iterable[str]) -> None:
+    """See to it that all methods of these names can run.
+
+    Raises:
+        InputError: If a module of the extra ``bench`` is missing or cannot be loaded.
+    """
+    for name in names:
+        for module in METHODS[name].needs:
+            need(module)

@@ -1,27 +1,30 @@
 """The paper's Table 1: pairs of views by the angle between them, from two kinds of start."""
 
 import zlib
-from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from benchmarks.paper.methods import METHODS, ScanPair
-from benchmarks.paper.study import Record, Result, Unit
-from benchmarks.paper.table1_page import tell
-from benchmarks.paper.trial import missing_modules, need_all, try_methods, without
-from benchmarks.paper.views import VirtualScan, mesh_of, overlap_of, start_pose, virtual_scan
+from benchmarks.paper.methods import METHODS, missing_modules, need_all, try_methods, without
+from benchmarks.paper.views import (
+    MADE,
+    OBJECTS,
+    VirtualPair,
+    VirtualScan,
+    mesh_of,
+    overlap_of,
+    start_pose,
+    virtual_scan,
+)
+from benchmarks.study.study import Result, Unit
 from scanweld.config import CoarseConfig, HeatConfig
 from scanweld.heat.features import Features, describe
 from scanweld.published.signature_matching import match_signatures
 
 NAME = "table1"
-TITLE = "Table 1: two views, any angle apart"
 
-OBJECTS = ("armadillo", "bunny")
 AZIMUTHS = tuple(range(0, 360, 45))
 GAPS = tuple(range(10, 130, 10))
 PROTOCOLS = ("identity", "random")
@@ -30,11 +33,9 @@ NOISE = 1e-3
 NOISY_AZIMUTHS = AZIMUTHS[::2]
 QUICK_GAPS = (30, 80)
 
-FROM_A_START = ("icp", "trimmed-icp", "gicp", "m-icc", "mm-icc")
-OWN = ("paper-coarse", "paper", "default")
-ELSEWHERE = ("fpfh-ransac", "fgr", "kiss-gicp")
-"""Library methods that make nothing of the start: they are tried from one kind of it only,"""
-NOISY = ("m-icc", "mm-icc", "paper", "default", "fpfh-ransac")
+LIBRARY_GLOBAL = {"fpfh-ransac", "fgr", "kiss-gicp"}
+"""They make nothing of the start: they are tried from one kind of it only,"""
+NOISY = {"m-icc", "mm-icc", "paper", "default", "fpfh-ransac"}
 """and so is the default where there is noise."""
 CPD_AZIMUTHS, CPD_GAPS = (0, 90), (10, 30, 50, 70, 90)
 """CPD takes as long as all others together."""
@@ -48,18 +49,17 @@ def units(quick: bool) -> list[Unit]:
     Raises:
         InputError: If a mesh or a library is missing.
     """
+    keys = ("object", "noise", "protocol", "azimuth", "gap")
     if quick:
+        cases = product((MADE,), (0.0,), PROTOCOLS, (0,), QUICK_GAPS)
         missing = missing_modules(METHODS)
-        told = {"missing": missing} if missing else {}
-        return [
-            {**_unit("creature", 0.0, protocol, 0, gap), **told}
-            for protocol, gap in product(PROTOCOLS, QUICK_GAPS)
-        ]
+        more = {"missing": missing} if missing else {}
+        return [dict(zip(keys, case, strict=True)) | more for case in cases]
     need_all(METHODS)
     for name in OBJECTS:
         mesh_of(name)
     return [
-        _unit(name, noise, protocol, azimuth, gap)
+        dict(zip(keys, (name, noise, protocol, azimuth, gap), strict=True))
         for name, noise, protocol in product(OBJECTS, (0.0, NOISE), PROTOCOLS)
         for azimuth, gap in product(NOISY_AZIMUTHS if noise else AZIMUTHS, GAPS)
     ]
@@ -67,48 +67,28 @@ def units(quick: bool) -> list[Unit]:
 
 def measure(unit: Unit) -> Result:
     """Register one pair by all methods that its unit asks for."""
-    i, j = _scans(unit)
-    start = start_pose(unit["protocol"], i, j, _seed(unit))
-    # The diameter that a run on these two scans would take, not that of the object.
-    pair = ScanPair(i=i.scan, j=j.scan, diameter=(i.scan.diameter + j.scan.diameter) / 2)
-    true, names = i.from_other(j), without(methods_of(unit), unit.get("missing", ()))
+    pair, seed = _pair(unit), _seed(unit)
+    start = start_pose(unit["protocol"], pair.scans, seed)
+    names = without(methods_of(unit), unit.get("missing", ()))
     azimuths = unit["azimuth"], unit["azimuth"] + unit["gap"]
     result = {
         "overlap": overlap_of(unit["object"], *azimuths),
-        "answers": try_methods(names, pair, start, true, i.diameter, _seed(unit)),
+        "answers": try_methods(names, pair.scans, start, pair.true, pair.i.diameter, seed),
     }
     is_of_the_paper = unit["protocol"] == "identity" and not unit["noise"]
     return {**result, "matches": _matches(unit["object"], *azimuths)} if is_of_the_paper else result
 
 
-def methods_of(unit: Unit) -> tuple[str, ...]:
+def methods_of(unit: Unit) -> list[str]:
     """The methods that are tried on a pair."""
+    left_out = {"point-to-plane"}
+    left_out |= LIBRARY_GLOBAL if unit["protocol"] == "identity" else {"paper-coarse"}
     if unit["noise"]:
-        names = NOISY
-    else:
-        names = (*FROM_A_START, *OWN)
-        if unit["azimuth"] in CPD_AZIMUTHS and unit["gap"] in CPD_GAPS:
-            names = (*names, "cpd")
-        names = (*names, *ELSEWHERE)
-    left_out = ("paper-coarse",)
-    if unit["protocol"] == "identity":
-        left_out = (*ELSEWHERE, "default") if unit["noise"] else ELSEWHERE
-    return tuple(name for name in names if name not in left_out)
-
-
-def page(records: Sequence[Record], out: Path) -> str:
-    """Floors, the paper's own table, and shares of successes of all methods."""
-    return tell(records, out)
-
-
-def _unit(name: str, noise: float, protocol: str, azimuth: int, gap: int) -> Unit:
-    return {
-        "object": name,
-        "noise": noise,
-        "protocol": protocol,
-        "azimuth": azimuth,
-        "gap": gap,
-    }
+        left_out |= METHODS.keys() - NOISY
+        left_out |= {"default"} if unit["protocol"] == "identity" else set()
+    if unit["azimuth"] not in CPD_AZIMUTHS or unit["gap"] not in CPD_GAPS:
+        left_out |= {"cpd"}
+    return [name for name in METHODS if name not in left_out]
 
 
 def _seed(unit: Unit) -> int:
@@ -116,15 +96,17 @@ def _seed(unit: Unit) -> int:
     return zlib.crc32(f"{unit['object']} {unit['azimuth']} {unit['gap']}".encode()) >> 1
 
 
-def _scans(unit: Unit) -> tuple[VirtualScan, VirtualScan]:
+def _pair(unit: Unit) -> VirtualPair:
     """The two scans; where the start is random, the second camera is rolled at random too."""
     name, noise, azimuth, gap = (unit[key] for key in ("object", "noise", "azimuth", "gap"))
     roll = 0.0
     if unit["protocol"] == "random":
         roll = float(np.random.default_rng([_seed(unit), 3]).uniform(0, 360))
-    i = virtual_scan(name, azimuth, noise=noise, seed=azimuth)
-    j = virtual_scan(name, azimuth + gap, roll_deg=roll, noise=noise, seed=1000 + azimuth + gap)
-    return i, j
+    other = azimuth + gap
+    return VirtualPair(
+        virtual_scan(name, azimuth, noise=noise, seed=azimuth),
+        virtual_scan(name, other, roll_deg=roll, noise=noise, seed=1000 + other),
+    )
 
 
 @lru_cache(maxsize=128)

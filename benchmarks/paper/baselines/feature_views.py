@@ -17,14 +17,13 @@ from benchmarks.features.harris3d import harris_keypoints
 from benchmarks.features.si_hks import octave_times, si_heat_signature
 from benchmarks.features.spectrum import Spectrum, spectrum_of, values_at
 from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
-from benchmarks.paper.baselines.fpfh import FEATURE_VOXELS, VOXEL
-from benchmarks.paper.optional import need
+from benchmarks.paper.baselines.fpfh import fpfh
 from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan
 from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import principal_diameter
-from scanweld.heat import Features, describe
+from scanweld.heat import describe
 from scanweld.heat.artificial_mesh import close_front
 from scanweld.heat.front import thin_front
 from scanweld.heat.signature import diffusion_times, heat_signature
@@ -56,14 +55,14 @@ class FeatureView:
     """A virtual scan with what its features are made of; sensor frame.
 
     Attributes:
+        name: Of the object.
         virtual: The scan.
-        features: Its PA-HKS keypoints.
         front: Eigenpairs of its artificial mesh, on the front's vertices.
         keypoints: Of each detector, (K, 3).
     """
 
+    name: str
     virtual: VirtualScan
-    features: Features
     front: Spectrum
     keypoints: dict[str, FloatArray]
 
@@ -78,8 +77,8 @@ def feature_view(name: str, azimuth_deg: float, roll_deg: float) -> FeatureView:
     rng = np.random.default_rng([round(azimuth_deg), 3])
     samples = scan.samples.points
     return FeatureView(
+        name=name,
         virtual=virtual,
-        features=features,
         front=_front_spectrum(scan, config),
         keypoints={
             "PA-HKS": features.points,
@@ -101,65 +100,57 @@ def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
 
 
 def distances(
-    descriptor: str, name: str, views: Sequence[FeatureView], points: Sequence[FloatArray]
+    descriptor: str, views: Sequence[FeatureView], points: Sequence[FloatArray]
 ) -> FloatArray:
     """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another.
 
     Args:
         descriptor: One of ``DESCRIPTORS``.
-        name: Of the object.
-        views: Two of them.
+        views: Two of an object.
         points: Of each, sensor frames.
 
     Raises:
         InputError: If the library that computes the descriptor is missing.
     """
-    of = _DESCRIBE[descriptor]
-    one, other = (of(name, view, at) for view, at in zip(views, points, strict=True))
+    described = _DESCRIBE[descriptor]
+    one, other = (described(view, at) for view, at in zip(views, points, strict=True))
     if descriptor == "WKS":
         return wave_distances(one, other)
     return cdist(one, other).astype(np.float64)
 
 
-def _pa_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+def _pa_hks(view: FeatureView, points: FloatArray) -> FloatArray:
     spectrum, config = view.front, HeatConfig()
     times = diffusion_times(spectrum.eigenvalues, config.num_times, config.longest_time_diameters2)
     signature = heat_signature(spectrum.eigenvalues, spectrum.functions, times)
     return values_at(signature, spectrum.points, points)
 
 
-def _si_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+def _si_hks(view: FeatureView, points: FloatArray) -> FloatArray:
     spectrum = view.front
     signature = si_heat_signature(spectrum.eigenvalues, spectrum.functions, octave_times(*_SCALES))
     return values_at(signature, spectrum.points, points)
 
 
-def _wks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+def _wks(view: FeatureView, points: FloatArray) -> FloatArray:
     spectrum = view.front
     bands, width = energy_bands(spectrum.eigenvalues)
     signature = wave_signature(spectrum.eigenvalues, spectrum.functions, bands, width)
     return values_at(signature, spectrum.points, points)
 
 
-def _full_mesh_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
-    vertices, signature, _ = _full_mesh(name)
+def _full_mesh_hks(view: FeatureView, points: FloatArray) -> FloatArray:
+    vertices, signature, _ = _full_mesh(view.name)
     return values_at(signature, vertices, view.virtual.world_from_sensor.apply(points))
 
 
-def _fpfh(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
+def _fpfh(view: FeatureView, points: FloatArray) -> FloatArray:
     """Fast point feature histograms (Rusu et al. 2009), as the pair methods use them."""
-    library = need("open3d")
     diameter, mesh = view.virtual.diameter, view.virtual.scan.mesh
-    cloud = library.geometry.PointCloud(library.utility.Vector3dVector(mesh.vertices / diameter))
-    cloud.normals = library.utility.Vector3dVector(np.array(mesh.normals))
-    cloud = cloud.voxel_down_sample(VOXEL)
-    around = library.geometry.KDTreeSearchParamHybrid(radius=FEATURE_VOXELS * VOXEL, max_nn=100)
-    found = library.pipelines.registration.compute_fpfh_feature(cloud, around)
-    _, nearest = KDTree(np.asarray(cloud.points)).query(points / diameter)
-    return np.asarray(found.data).T[nearest]
+    return fpfh(mesh.vertices / diameter, mesh.normals, points / diameter)
 
 
-_DESCRIBE: dict[str, Callable[[str, FeatureView, FloatArray], FloatArray]] = {
+_DESCRIBE: dict[str, Callable[[FeatureView, FloatArray], FloatArray]] = {
     "PA-HKS": _pa_hks,
     "SI-HKS": _si_hks,
     "WKS": _wks,

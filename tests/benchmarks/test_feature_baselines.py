@@ -1,0 +1,284 @@
+"""Descriptors and keypoints that the study compares with PA-HKS, against analytic truth."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from benchmarks.features.full_mesh_hks import (
+    full_mesh_hks,
+    full_mesh_keypoints,
+    full_mesh_spectrum,
+    thin_mesh,
+)
+from benchmarks.features.harris3d import harris_keypoints, harris_response
+from benchmarks.features.si_hks import octave_times, si_heat_signature
+from benchmarks.features.spectrum import Spectrum, spectrum_of, values_at
+from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
+from benchmarks.paper import features
+from benchmarks.paper.baselines.feature_views import DESCRIPTORS, DETECTORS
+from benchmarks.paper.features import QUESTIONS, answer
+from benchmarks.paper.pages import write_page
+from benchmarks.study.optional import need
+from benchmarks.study.study import Record
+from scanweld.errors import InputError
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.geometry.pose import random_rotation
+from tests.scenes import small_creature
+
+
+def ball(subdivisions: int) -> tuple[FloatArray, IntArray]:
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions)
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def vertex_areas(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    areas = np.linalg.norm(face_normals(vertices, faces), axis=1) / 6
+    summed = np.bincount(faces.ravel(), weights=np.repeat(areas, 3), minlength=len(vertices))
+    return summed.astype(np.float64)
+
+
+def creature_spectrum(scale: float = 1.0) -> Spectrum:
+    mesh = thin_mesh(small_creature(), 900)
+    return spectrum_of(scale * mesh.vertices, mesh.faces, 170.0, 80)
+
+
+def box_surface(per_edge: int) -> FloatArray:
+    """Evenly spread points of the cube [0, 1]^3, edges and corners among them."""
+    steps = np.linspace(0, 1, per_edge)
+    grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    return grid[((grid == 0) | (grid == 1)).any(axis=1)]
+
+
+def moved(points: FloatArray, seed: int) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    return points @ random_rotation(rng).T + rng.normal(size=3)
+
+
+def test_thin_mesh_keeps_the_surface():
+    mesh = small_creature()
+    thin = thin_mesh(mesh, 800)
+    assert 700 < len(thin.vertices) <= 800
+    area, thin_area = (
+        np.linalg.norm(face_normals(m.vertices, m.faces), axis=1).sum() for m in (mesh, thin)
+    )
+    assert thin_area == pytest.approx(area, rel=0.1)
+    inside = trimesh.Trimesh(thin.vertices, thin.faces, process=False)
+    assert inside.volume == pytest.approx(
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).volume, rel=0.1
+    )
+    assert len(np.unique(np.sort(thin.faces, axis=1), axis=0)) == len(thin.faces)
+
+
+def test_thin_mesh_leaves_a_small_mesh_as_it_is():
+    vertices, faces = ball(2)
+    thin = thin_mesh(TriangleMesh(vertices=vertices, faces=faces), 1000)
+    assert np.array_equal(thin.vertices, vertices)
+    assert np.array_equal(thin.faces, faces)
+
+
+def test_thinned_sphere_has_the_spectrum_of_spherical_harmonics():
+    vertices, faces = ball(4)
+    mesh = TriangleMesh(vertices=vertices, faces=faces)
+    spectrum, _ = full_mesh_spectrum(mesh, max_vertices=1000, num_modes=16)
+    degree = np.repeat(np.arange(4), 2 * np.arange(4) + 1)
+    # Lengths are measured in diameters of the box: 2 sqrt(3).
+    assert spectrum.eigenvalues == pytest.approx(12 * degree * (degree + 1), rel=0.06, abs=1e-6)
+
+
+def test_full_mesh_signature_moves_with_the_mesh():
+    mesh = small_creature()
+    turned = TriangleMesh(vertices=moved(mesh.vertices, 3), faces=mesh.faces)
+    signatures, places = [], []
+    for each in (mesh, turned):
+        spectrum, faces = full_mesh_spectrum(each, max_vertices=800, num_modes=60)
+        signature = full_mesh_hks(spectrum)
+        at = full_mesh_keypoints(spectrum, faces, signature, 170.0)
+        signatures.append(signature)
+        places.append(at)
+    assert signatures[0] == pytest.approx(signatures[1], abs=1e-3)
+    assert np.array_equal(*places)
+    assert 5 <= len(places[0]) <= 60
+
+
+def test_values_are_carried_to_points_nearby():
+    rng = np.random.default_rng(2)
+    vertices = rng.random((2000, 3)) * [1, 1, 0]
+    values = vertices @ np.array([[1.0, 0.5], [2.0, 0.0], [0.0, 0.0]])
+    points = 0.1 + 0.8 * rng.random((50, 3)) * [1, 1, 0]
+    points[:, 2] = 0
+    expected = points @ np.array([[1.0, 0.5], [2.0, 0.0], [0.0, 0.0]])
+    assert values_at(values, vertices, points) == pytest.approx(expected, abs=0.06)
+    assert values_at(values, vertices, vertices[:5]) == pytest.approx(values[:5], abs=1e-6)
+
+
+def test_scale_invariant_signature_ignores_the_size():
+    """The size is not taken out beforehand: the eigenvalues of the larger object are smaller."""
+    plain = creature_spectrum()
+    times = octave_times(2.0**-14, 2.0**8)
+    for factor in (0.5, 1.7, 3.0):
+        larger = creature_spectrum(factor)
+        assert larger.eigenvalues[1] == pytest.approx(plain.eigenvalues[1] / factor**2, rel=1e-3)
+        one, other = (si_heat_signature(s.eigenvalues, s.functions, times) for s in (plain, larger))
+        assert np.abs(one - other).max() < 0.02 * np.abs(one).max()
+        # Which takes the magnitudes: the signature does tell the points apart.
+        assert np.ptp(one, axis=0)[1] > 0.2 * np.abs(one).max()
+
+
+def test_scale_invariant_signature_of_a_sphere_follows_its_heat_trace():
+    """All points share the trace h(t) = sum (2 l + 1) exp(-l (l + 1) t) / (4 pi)."""
+    vertices, faces = ball(3)
+    spectrum = spectrum_of(vertices, faces, 1.0, 100)
+    times = octave_times(2.0**-5, 2.0**6)
+    found = si_heat_signature(spectrum.eigenvalues, spectrum.functions, times)
+    degree = np.arange(10)
+    weights = (2 * degree + 1)[:, None] * np.exp(-np.outer(degree * (degree + 1), times))
+    slope = np.gradient(np.log(weights.sum(axis=0)), 1 / 16, edge_order=2)
+    expected = np.abs(np.fft.rfft(slope))[:6] / len(times)
+    assert found == pytest.approx(np.broadcast_to(expected, found.shape), rel=0.05, abs=0.01)
+
+
+def test_wave_signature_is_one_on_the_whole_and_over_the_sphere():
+    vertices, faces = ball(3)
+    spectrum = spectrum_of(vertices, faces, 1.0, 49)
+    bands, width = energy_bands(spectrum.eigenvalues)
+    signature = wave_signature(spectrum.eigenvalues, spectrum.functions, bands, width)
+    assert signature.shape == (len(vertices), 100)
+    # Points of a sphere share every energy evenly.
+    assert signature == pytest.approx(np.full(signature.shape, 1 / (4 * np.pi)), rel=0.1)
+    mesh = thin_mesh(small_creature(), 900)
+    body = creature_spectrum()
+    bands, width = energy_bands(body.eigenvalues)
+    signature = wave_signature(body.eigenvalues, body.functions, bands, width)
+    total = vertex_areas(mesh.vertices / 170.0, mesh.faces) @ signature
+    assert total == pytest.approx(np.ones(100), rel=0.02)
+
+
+def test_energy_bands_keep_two_widths_from_both_ends():
+    bands, width = energy_bands(np.array([0.0, 1e-9, 2.0, 5.0, 300.0]), 50)
+    assert bands[0] - 2 * width == pytest.approx(np.log(2.0))
+    assert bands[-1] + 2 * width == pytest.approx(np.log(300.0))
+    assert width == pytest.approx(7 * (bands[1] - bands[0]))
+
+
+def test_wave_signature_of_a_moved_mesh_is_the_same():
+    mesh = thin_mesh(small_creature(), 900)
+    turned = spectrum_of(moved(mesh.vertices, 5), mesh.faces, 170.0, 80)
+    plain = creature_spectrum()
+    bands, width = energy_bands(plain.eigenvalues)
+    times = octave_times(2.0**-12, 2.0**4)
+    for of in (
+        lambda s: wave_signature(s.eigenvalues, s.functions, bands, width),
+        lambda s: si_heat_signature(s.eigenvalues, s.functions, times),
+    ):
+        assert of(turned) == pytest.approx(of(plain), rel=1e-3, abs=1e-3)
+
+
+def test_wave_distance_is_relative():
+    one, other = np.array([[1.0, 2.0], [3.0, 0.0]]), np.array([[1.0, 6.0], [3.0, 0.0]])
+    assert wave_distances(one, other) == pytest.approx(np.array([[0.5, 1.5], [1.5, 0.0]]))
+
+
+def test_harris_finds_the_corners_of_a_box():
+    points = moved(box_surface(26), 1)
+    at = np.arange(len(points))
+    found = harris_keypoints(points, at, 0.17, 0.2, 50)
+    corners = moved(np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1.0)]), 1)
+    apart = np.linalg.norm(points[found][:, None] - corners, axis=-1)
+    assert len(found) == 8
+    assert sorted(apart.argmin(axis=1)) == list(range(8))
+    assert apart.min(axis=1).max() < 0.06
+
+
+def test_harris_finds_nothing_on_a_plane_or_along_an_edge():
+    x, y = np.meshgrid(np.linspace(0, 1, 31), np.linspace(0, 1, 31))
+    flat = moved(np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1), 2)
+    bent = moved(np.stack([x.ravel(), y.ravel(), np.abs(x.ravel() - 0.5)], axis=1), 2)
+    for points in (flat, bent):
+        assert len(harris_keypoints(points, np.arange(len(points)), 0.12, 0.1, 50)) == 0
+
+
+def test_harris_response_of_a_paraboloid():
+    """Over a patch of z = (a x^2 + b y^2) / 2 the fit is exact at the top: A = 2 a^2, B = 2 b^2."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41))
+    a, b = 0.4, 0.2
+    points = np.stack([x.ravel(), y.ravel(), 0.5 * (a * x**2 + b * y**2).ravel()], axis=1)
+    top = np.array([20 * 41 + 20])
+    expected = 2 * a**2 * 2 * b**2 - 0.04 * (2 * a**2 + 2 * b**2) ** 2
+    assert harris_response(points, top, 1.0) == pytest.approx([expected])
+    assert harris_response(10 * points, top, 10.0) == pytest.approx([expected])
+    assert harris_response(moved(points, 7), top, 1.0) == pytest.approx([expected])
+
+
+def test_harris_needs_neighbours():
+    points = np.eye(3)
+    assert harris_response(points, np.arange(3), 0.1).tolist() == [-np.inf] * 3
+    assert len(harris_keypoints(points, np.arange(3), 0.1, 0.1, 5)) == 0
+
+
+def test_a_missing_library_is_named_with_its_remedy():
+    assert need("math").pi == pytest.approx(np.pi)
+    with pytest.raises(InputError, match=r"pip install 'scanweld\[bench\]'"):
+        need("no_such_library")
+
+
+def test_answers_count_what_is_right_among_what_is_asked():
+    """Three points ask; the last one's place is not seen, the middle one has no partner."""
+    apart = np.array([[0.1, 0.2, 0.9], [0.3, 0.1, 0.9], [0.9, 0.9, 0.0]])
+    is_right = np.array([[False, True, False], [False, False, False], [False, False, True]])
+    found = answer(apart, is_right, np.array([True, True, False]))
+    assert found["nearest"] == pytest.approx([0, 2, 1 / 3])
+    assert found["mutual"] == pytest.approx([0, 2, 1 / 3])
+    assert found["among 8"] == pytest.approx([1, 1, 1])
+    found = answer(apart, is_right, np.array([False, False, True]))
+    assert found["nearest"] == pytest.approx([1, 1, 1 / 3])
+    none = answer(np.zeros((0, 3)), np.zeros((0, 3), dtype=bool), np.zeros(0, dtype=bool))
+    assert none == {question: [0.0, 0.0, 0.0] for question in QUESTIONS}
+
+
+def test_a_random_descriptor_is_right_as_often_as_chance_says():
+    rng = np.random.default_rng(8)
+    total = {question: np.zeros(3) for question in QUESTIONS}
+    for _ in range(150):
+        is_right = rng.random((30, 40)) < 0.05
+        found = answer(rng.random((30, 40)), is_right, rng.random(30) < 0.7)
+        for question in QUESTIONS:
+            total[question] += found[question]
+    for right, asked, chance in total.values():
+        assert asked > 400
+        assert right == pytest.approx(chance, abs=4 * np.sqrt(chance))
+
+
+def test_features_are_measured_and_told(tmp_path: Path):
+    unit = features.units(quick=True)[0]
+    result = json.loads(json.dumps(features.measure(unit)))
+    repeated = {name: told["repeated"] for name, told in result["detectors"].items()}
+    assert tuple(repeated) == DETECTORS
+    right, asked, chance = repeated["HKS, full mesh"]
+    # The same places on the mesh, in both views.
+    assert right == asked > chance
+    assert repeated["PA-HKS"][0] > repeated["PA-HKS"][2]
+    for group in ("own", "even"):
+        assert tuple(result[group]) == DESCRIPTORS
+    right, asked, chance = result["even"]["HKS, full mesh"]["nearest"]
+    assert right / asked > 0.4 > 4 * chance / asked
+    write_page("features", [Record(unit=unit, result=result)], tmp_path, quick=True)
+    told = (tmp_path / "features.md").read_text(encoding="utf-8")
+    assert "| PA-HKS |" in told and "## Creature" in told
+    assert (tmp_path / "features.png").stat().st_size > 10_000
+
+
+def test_a_row_without_its_library_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def fail(module: str) -> None:
+        raise InputError(f"{module} is missing")
+
+    monkeypatch.setattr("benchmarks.paper.baselines.fpfh.need", fail)
+    unit = features.units(quick=True)[0]
+    result = features.measure(unit)
+    assert result["own"]["FPFH"] == {"missing": "open3d is missing"}
+    write_page("features", [Record(unit=unit, result=result)], tmp_path, quick=True)
+    told = (tmp_path / "features.md").read_text(encoding="utf-8")
+    assert "| FPFH | open3d is missing |" in told
