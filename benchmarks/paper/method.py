@@ -1,7 +1,7 @@
 """docs/method.md: its template, filled with one JSON of numbers that come from all records."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import mean
 from typing import Any
@@ -10,24 +10,14 @@ import numpy as np
 
 from benchmarks.paper import basins
 from benchmarks.paper.ablations import parts, search
-from benchmarks.paper.pages.ablations import (
-    COARSE_RIGHT,
-    CONVERGED,
-    apart,
-    contour_errors,
-    heat_cell,
-    term_errors,
-)
-from benchmarks.paper.pages.basins import CONVERGED as IN_BASIN
+from benchmarks.paper.pages import ablations as told
+from benchmarks.paper.pages import features, table1, table2
 from benchmarks.paper.pages.basins import answers_from
-from benchmarks.paper.pages.features import pooled
-from benchmarks.paper.pages.table1 import share_of_matches
-from benchmarks.paper.pages.table2 import rms_mm, runs
-from benchmarks.paper.settings import SETTINGS, SWEEP, SWEEP_DEG, TUNED, is_converged
+from benchmarks.paper.settings import COARSE_RIGHT, CONVERGED, SETTINGS, SWEEP, SWEEP_DEG, TUNED
+from benchmarks.scores import Stated
 from benchmarks.study.pages import percent, rendered
-from benchmarks.study.records import answers, of, up_to, values_of
+from benchmarks.study.records import Limit, Records, answers, grouped, of, up_to, values_of
 from benchmarks.study.study import Record, measured_by, read_records
-from benchmarks.study.success import Limit, auc
 from scanweld.config import Config
 from scanweld.evidence.evidence import Evidence
 from scanweld.io.atomic import write_whole
@@ -36,7 +26,6 @@ from scanweld.pairs.problem import schedules
 TEMPLATE = Path(__file__).with_name("method_template.md")
 OTHERS = Path(__file__).parents[2] / "docs/data"
 
-Records = Sequence[Record]
 Numbers = dict[str, Any]
 
 WIDE, THIN = (0.10, 1.01), (0.05, 0.10)
@@ -120,13 +109,17 @@ def _pairs(records: Sequence[Mapping[str, Any]]) -> Numbers:
     scored = [a for a in told if a["score"] >= Config().pairs.min_score]
     scored_right = [a for a in scored if a["rank"] == 1]
     good = [a["rank"] == 1 for a in told if a["kind"] == "good"]
+
+    def auc(scores: Iterable[float]) -> float:
+        return Stated.of(zip(scores, is_right, strict=True)).auc
+
     free_of_right = [e.free for e, right in zip(evidence, is_right, strict=True) if right]
     return {
         **{kind: _anchors(answers) for kind, answers in by_anchors.items()},
         "num": len(told),
         "free_of_right": percent(float(np.quantile(free_of_right, 0.9))),
-        "auc_agree": f"{auc([e.agree for e in evidence], is_right):.3f}",
-        "auc_built": f"{auc([e.score for e in evidence], is_right):.3f}",
+        "auc_agree": f"{auc(e.agree for e in evidence):.3f}",
+        "auc_built": f"{auc(e.score for e in evidence):.3f}",
         "good_right": sum(good),
         "good_wrong": len(good) - sum(good),
         "scored_right": len(scored_right),
@@ -172,7 +165,8 @@ def _features(records: Records) -> Numbers:
     """Shares by gap, right and by chance, of repeated keypoints and of nearest descriptors."""
 
     def shares(group: str, question: str, place: int) -> str:
-        counts = [pooled(of(records, gap=g), group, "PA-HKS", question) for g in FEATURE_GAPS]
+        by_gap = [of(records, gap=gap) for gap in FEATURE_GAPS]
+        counts = [features.pooled(pairs, group, question, "PA-HKS") for pairs in by_gap]
         *first, last = (percent(of_gap[place] / of_gap[1]) for of_gap in counts)
         return f"{', '.join(first)} and {last}"
 
@@ -197,8 +191,8 @@ def _table1(records: Records) -> Numbers:
         "default": RIGHT.count(answers(from_identity, "default")),
         "default_random": RIGHT.count(answers(from_random, "default")),
         "matched": f"{number['matched']:.0f} of {number['keypoints']:.0f}",
-        "matched_right": share_of_matches(matched, "right"),
-        "matched_chance": share_of_matches(matched, "by_chance"),
+        "matched_right": table1.share_of_matches(matched, "right"),
+        "matched_chance": table1.share_of_matches(matched, "by_chance"),
     }
 
 
@@ -206,7 +200,7 @@ def _table2(records: Records) -> Numbers:
     """Runs that converge, by the kind of views and in the sweep, and whose RMS beats the paper."""
     final, sweep = of(records, part="final", noise=0.0), of(records, part="sweep")
     by_default = of(final, method="default")
-    below = [rms_mm(r) < SETTINGS[r.unit["setting"]].printed[1] for r in by_default]
+    below = [table2.rms_mm(r) < SETTINGS[r.unit["setting"]].printed[1] for r in by_default]
     return {
         "converged": {
             method: {
@@ -230,8 +224,8 @@ def _kind(record: Record) -> str:
 
 def _converged(records: Records) -> str:
     """From the given starts: the coarse pose is not one that every setting has."""
-    started = [is_converged(run) for run in runs(records) if run["start"] != "coarse"]
-    return f"{sum(started)} of {len(started)}"
+    runs = [run for run in table2.runs(records) if run["start"] != "coarse"]
+    return f"{table2.count(runs)} of {len(runs)}"
 
 
 def _swept(records: Records, key: str) -> str:
@@ -248,24 +242,24 @@ def _swept(records: Records, key: str) -> str:
 
 def _basins(records: Records) -> Numbers:
     """Right answers from far off at the widest gap."""
-    widest = of(records, gap=WIDE_GAP)
+    far = of(records, gap=WIDE_GAP)
     methods = (*basins.FROM_A_START, basins.JOINT)
-    right = {m: IN_BASIN.count(answers_from(widest, FAR_START, m)) for m in methods}
+    right = {m: CONVERGED.count(answers_from(far, FAR_START, m)) for m in methods}
     return {"gap": WIDE_GAP, "start": FAR_START, **right}
 
 
 def _contours(records: Records) -> Numbers:
     """Runs of the variants that come right, their median error, and how far contours lie apart."""
-    widest = of(records, gap=WIDE_GAP)
+    far = of(records, gap=WIDE_GAP)
     return {
-        "right": {n: CONVERGED.count(contour_errors(records, n)) for n in parts.CONTOURS},
+        "right": {n: CONVERGED.count(told.contour_errors(records, n)) for n in parts.CONTOURS},
         "error": {name: _median_error(records, name) for name in parts.CONTOURS},
-        "apart": {name: f"{apart(widest, name)[-1]:.1f}" for name in parts.PRUNED},
+        "apart": {name: told.apart(far, name)[-1] for name in parts.PRUNED},
     }
 
 
 def _median_error(records: Records, variant: str) -> str:
-    right = [error for error in contour_errors(records, variant) if CONVERGED.holds(error)]
+    right = CONVERGED.among(told.contour_errors(records, variant))
     if not right:
         return "-"
     deg, shift = (np.median([error[key] for error in right]) for key in ("deg", "percent"))
@@ -274,21 +268,18 @@ def _median_error(records: Records, variant: str) -> str:
 
 def _terms(records: Records) -> Numbers:
     """Median rotation error by gap with some of the terms of the joint refinement."""
-    gaps = values_of(records, "gap")
-    medians = {
-        name: [float(np.median(term_errors(of(records, gap=gap), name)[0])) for gap in gaps]
-        for name in (parts.ALONE, *parts.TERMS)
-    }
+    by_gap = {gap: told.term_middles(pairs) for gap, pairs in grouped(records, "gap").items()}
+    names = (parts.ALONE, *parts.TERMS)
     return {
-        "gaps": " / ".join(map(str, gaps)),
+        "gaps": " / ".join(by_gap),
         "start": f"{parts.TERMS_START_DEG:g}",
-        **{name: " / ".join(f"{m:.2f}" for m in by_gap) for name, by_gap in medians.items()},
+        **{name: " / ".join(f"{m[name]:.2f}" for m in by_gap.values()) for name in names},
     }
 
 
 def _heat(records: Records) -> Numbers:
     return {
-        what: {name: heat_cell(records, name, what) for name in parts.HEAT}
+        what: {name: told.heat_cell(records, name, what) for name in parts.HEAT}
         for what in ("repeated", "matched")
     }
 

@@ -10,7 +10,6 @@ from benchmarks.paper.baselines.records import Method, ScanPair
 from benchmarks.paper.views import pose_error
 from benchmarks.study.optional import is_usable, need
 from benchmarks.study.plots import Curve
-from scanweld.errors import InputError
 from scanweld.geometry.pose import Pose
 
 
@@ -54,26 +53,12 @@ METHODS: dict[str, Entry] = {
 }
 """In the order in which tables show them."""
 
-
 BY_TITLE = {entry.title: name for name, entry in METHODS.items()}
-_STRONG = ("default", "paper")
 
 
-def curve(name: str, places: Sequence[float], shares: Sequence[float]) -> Curve:
+def curve(name: str, shares: Sequence[float]) -> Curve:
     """Shares of a method as plots draw them."""
-    color, strong = METHODS[name].color, name in _STRONG
-    return Curve(places=places, shares=shares, color=color, strong=strong)
-
-
-def method(name: str) -> Entry:
-    """The method of this name.
-
-    Raises:
-        InputError: If there is none; the message names those that are.
-    """
-    if name not in METHODS:
-        raise InputError(f"{name}: no such method; there are {', '.join(METHODS)}")
-    return METHODS[name]
+    return Curve(shares, METHODS[name].color, is_strong=name in ("default", "paper"))
 
 
 def try_methods(

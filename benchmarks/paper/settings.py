@@ -17,6 +17,7 @@ from benchmarks.paper.views import (
     pose_error,
     virtual_scan,
 )
+from benchmarks.study.records import Limit
 from scanweld.config import ContoursConfig
 from scanweld.contours.contour_sets import far_side
 from scanweld.geometry.arrays import FloatArray
@@ -26,8 +27,7 @@ from scanweld.geometry.scan import principal_diameter
 
 AZIMUTH_STEP_DEG = 15
 """Simple and complex views are chosen among rings that start at multiples of this."""
-CONVERGED_DEG = 2.0
-CONVERGED_PERCENT = 1.0
+CONVERGED = Limit(deg=2.0, percent=1.0)
 """A run has converged if every view is turned and shifted (of the diameter) by less."""
 STARTS = ((10, 8), (20, 8), (40, 32))
 """Angle of the starts in degrees, and how many: from near, nearly all runs converge."""
@@ -35,8 +35,8 @@ NUM_SWEPT, FIRST_SWEPT = 8, 100
 """Other starts, by number and first seed, by which the tuning is chosen."""
 SWEEP_DEG = 40
 """The tuning is chosen by the hardest starts: from the others nearly all runs converge."""
-COARSE_DEG, COARSE_PERCENT = 5.0, 2.0
-"""A coarse pose is right within these."""
+COARSE_RIGHT = Limit(deg=5.0, percent=2.0)
+"""Within this a coarse pose is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +158,8 @@ def start_poses(scans: Sequence[VirtualScan], degrees: float, seed: int) -> dict
 
 def is_converged(run: Mapping[str, Any]) -> bool:
     """Whether all views came out right; a run without errors did not place all of them."""
-    return (
-        "rotation_deg" in run
-        and run["rotation_deg"] < CONVERGED_DEG
-        and run["translation_percent"] < CONVERGED_PERCENT
-    )
+    found = {"deg": run.get("rotation_deg"), "percent": run.get("translation_percent")}
+    return CONVERGED.holds(found)
 
 
 def outcome(

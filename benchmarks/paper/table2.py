@@ -6,8 +6,7 @@ from typing import Any
 
 from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined
 from benchmarks.paper.settings import (
-    COARSE_DEG,
-    COARSE_PERCENT,
+    COARSE_RIGHT,
     FIRST_SWEPT,
     NUM_SWEPT,
     NUMERALS,
@@ -27,7 +26,6 @@ from benchmarks.paper.settings import (
 )
 from benchmarks.paper.views import VirtualScan, mesh_of, pose_error
 from benchmarks.study.study import Unit
-from benchmarks.study.success import Limit
 from scanweld.config import Config, FusionConfig
 from scanweld.geometry.pose import Pose
 from scanweld.pipeline.run import run
@@ -39,7 +37,6 @@ NOISES = (0.0, 0.001)
 """Standard deviation of the depth, in diameters."""
 NUM_DEFAULT_DRAWS = 3
 """The default takes no start: only noise makes its runs differ."""
-COARSE_RIGHT = Limit(deg=COARSE_DEG, percent=COARSE_PERCENT)
 
 
 def units(quick: bool) -> list[Unit]:

@@ -1,13 +1,31 @@
-"""Pages in Markdown: templates of prose, filled with numbers, and tables described as data."""
+"""Pages in Markdown: templates that tell and tabulate what functions make of records.
+
+In a template ``{{=heat.keypoints._ALIKE}}`` is a constant of the package and
+``{{=Config.heat.num_modes}}`` a default setting; everything else is Jinja's. A table is a ``grid``
+whose cell stands in the template::
+
+    {% call(row, column) grid("heading", rows, columns) %}{{ row }} at {{ column }}{% endcall %}
+"""
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, TypeVar
 
 from jinja2 import Environment, StrictUndefined
 
+from benchmarks.study.records import (
+    answers,
+    beyond,
+    grouped,
+    of,
+    overlap_title,
+    overlapping,
+    up_to,
+    values_of,
+)
 from scanweld.config import Config
 
 R = TypeVar("R")
@@ -25,21 +43,22 @@ def markdown_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> st
 
 def grid(
     corner: str | tuple[str, ...],
-    rows: Mapping[str, R] | Mapping[tuple[str, ...], R],
+    rows: Mapping[str, R] | Mapping[tuple[str, ...], R] | Sequence[str],
     columns: Mapping[str, C],
-    cell: Callable[[R, C], str],
+    caller: Callable[[R, C], str],
 ) -> str:
     """A table in Markdown with a cell for every row and column; rows without any text are left out.
 
     Args:
         corner: Heading of the rows' titles; several where rows have several.
-        rows: What each row is about, by its title.
+        rows: What each row is about, by its title; or the titles alone.
         columns: The same of the columns.
-        cell: The text where a row and a column meet.
+        caller: The text where a row and a column meet.
     """
+    named: Mapping[Any, Any] = rows if isinstance(rows, Mapping) else {row: row for row in rows}
     kept = []
-    for titles, row in rows.items():
-        cells = [cell(row, column) for column in columns.values()]
+    for titles, row in named.items():
+        cells = [caller(row, column).strip() for column in columns.values()]
         if any(cells):
             kept.append((*_several(titles), *cells))
     return markdown_table((*_several(corner), *columns), kept)
@@ -49,27 +68,28 @@ def _several(titles: str | tuple[str, ...]) -> tuple[str, ...]:
     return (titles,) if isinstance(titles, str) else titles
 
 
-def percent(share: float) -> str:
-    """A share as a whole percentage."""
-    return f"{100 * share:.0f} %"
+def percent(share: float, digits: int = 0) -> str:
+    """A share as a percentage."""
+    return f"{100 * share:.{digits}f} %"
+
+
+_JINJA = Environment(
+    undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
+)
+_JINJA.filters["percent"] = percent
+_HELPERS = (grid, answers, beyond, grouped, of, overlap_title, overlapping, up_to, values_of)
+_JINJA.globals |= {function.__name__: function for function in _HELPERS}
 
 
 def rendered(template: Path, values: Mapping[str, Any]) -> str:
     """A template with its constants and values filled in.
-
-    ``{{=heat.keypoints._ALIKE}}`` is a constant of the package, ``{{=Config.heat.num_modes}}`` a
-    default setting; everything else is Jinja's.
 
     Raises:
         ValueError: If a constant is not there.
         jinja2.UndefinedError: If a value is not there.
     """
     text = CONSTANT.sub(lambda found: constant(found[1]), template.read_text(encoding="utf-8"))
-    jinja = Environment(
-        undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
-    )
-    jinja.filters["percent"] = percent
-    return jinja.from_string(text).render(values)
+    return _JINJA.from_string(text).render(values)
 
 
 def constant(path: str) -> str:
@@ -79,21 +99,16 @@ def constant(path: str) -> str:
         ValueError: If there is none.
     """
     try:
-        value = _setting(path) if path.startswith("Config.") else _named(path)
+        value = _constant(path)
     except (ImportError, AttributeError, IndexError) as error:
         raise ValueError(f"{path}: no such constant") from error
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _setting(path: str) -> Any:
-    value: Any = Config()
-    for name in path.split(".")[1:]:
-        value = value[int(name)] if name.isdigit() else getattr(value, name)
-    return value
-
-
-def _named(path: str) -> Any:
-    *names, last = path.split(".")
+def _constant(path: str) -> Any:
+    names, _, last = path.rpartition(".")
     if last.isdigit():
-        return resolve_name(f"scanweld.{'.'.join(names)}")[int(last)]
+        return _constant(names)[int(last)]
+    if path.startswith("Config."):
+        return attrgetter(path.removeprefix("Config."))(Config())
     return resolve_name(f"scanweld.{path}")

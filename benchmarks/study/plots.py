@@ -1,7 +1,7 @@
 """Plots of shares: a panel for each case, a curve for each method."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,32 +11,23 @@ from benchmarks.study.optional import need
 from scanweld.geometry.arrays import FloatArray
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Curve:
-    """Shares from 0 to 1 at some places, NaN where there is none.
+    """Shares from 0 to 1, one a tick, NaN where there is none; how the line looks."""
 
-    Attributes:
-        places: (N,) on the axis.
-        shares: (N,).
-        color: Of matplotlib.
-        style: Dashes of the line.
-        strong: Whether it stands out among the others.
-    """
-
-    places: Sequence[float] | FloatArray
     shares: Sequence[float] | FloatArray
     color: str
     style: str = "-"
-    strong: bool = False
+    is_strong: bool = False
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Panel:
-    """Curves by their titles, in axes with a tick at each of some places."""
+    """Curves by their titles, over ticks: places on the axis and their names."""
 
     title: str
-    curves: Mapping[str, Curve]
     ticks: Mapping[int, str]
+    curves: dict[str, Curve] = field(default_factory=dict)
 
 
 def draw_panels(path: Path, rows: Sequence[Sequence[Panel]], x_title: str, y_title: str) -> None:
@@ -69,18 +60,13 @@ def _drawn(axes: Any, panel: Panel) -> dict[str, Any]:
     for title, curve in panel.curves.items():
         shares = 100 * np.asarray(curve.shares)
         known = np.isfinite(shares)
-        if not known.any():
-            continue
-        [lines[title]] = axes.plot(
-            np.asarray(curve.places)[known],
-            shares[known],
-            curve.style,
-            color=curve.color,
-            linewidth=2.6 if curve.strong else 1.4,
-            marker="o",
-            markersize=3.5,
-            zorder=3 if curve.strong else 2,
-        )
+        if known.any():
+            strength = {"linewidth": 2.6, "zorder": 3} if curve.is_strong else {"linewidth": 1.4}
+            places = np.array(list(panel.ticks))[known]
+            [lines[title]] = axes.plot(
+                places, shares[known], curve.style, color=curve.color, marker="o", markersize=3.5,
+                **strength,
+            )  # fmt: skip
     axes.set(title=panel.title, ylim=(-4, 104))
     axes.set_xticks(list(panel.ticks), list(panel.ticks.values()))
     axes.grid(color="#E4E6EA", linewidth=0.8)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from benchmarks.paper import __main__ as command
@@ -15,8 +14,8 @@ from benchmarks.paper import methods, real_pairs, table1
 from benchmarks.paper.methods import METHODS
 from benchmarks.paper.pages import write_page
 from benchmarks.paper.views import mesh_of
+from benchmarks.study.records import Limit
 from benchmarks.study.study import Record, Study, Table, read_records
-from benchmarks.study.success import Limit, auc, cell, share_right
 from tests.data import require_data
 
 OWN_TABLES = ("table1", "real_pairs")
@@ -124,19 +123,12 @@ def test_an_answer_is_right_by_angle_and_shift():
 def test_a_cell_counts_the_right_and_takes_their_median_only():
     told = [answer(0.1), answer(0.3), answer(90.0), answer(None, None)]
     limit = Limit(deg=1, percent=1)
-    assert cell(told, limit) == "2/4 0.20"
-    assert cell(told[2:], limit) == "0/2"
-    assert cell([], limit) == ""
-    assert cell([*told, answer(4.0)], limit, Limit(deg=5, percent=1)) == "2/5 0.20 (+1)"
-    assert cell(told, limit, Limit(deg=5, percent=1)) == "2/4 0.20"
-    assert share_right(told, limit) == 0.5
-
-
-def test_auc_counts_right_above_wrong_and_halves_ties():
-    assert auc([3, 1, 2], [True, False, False]) == 1.0
-    assert auc([1, 3, 2], [True, False, False]) == 0.0
-    assert auc([1, 1], [True, False]) == 0.5
-    assert np.isnan(auc([1, 2], [True, True]))
+    assert limit.cell(told) == "2/4 0.20"
+    assert limit.cell(told[2:]) == "0/2"
+    assert limit.cell([]) == ""
+    assert limit.cell([*told, answer(4.0)], Limit(deg=5, percent=1)) == "2/5 0.20 (+1)"
+    assert limit.cell(told, Limit(deg=5, percent=1)) == "2/4 0.20"
+    assert limit.share(told) == 0.5
 
 
 def pair_record(gap: int, overlap: float, deg: float | None, **changes: Any) -> Record:

@@ -8,8 +8,9 @@ import numpy as np
 from benchmarks.paper.baselines.own import searched
 from benchmarks.paper.baselines.records import ScanPair
 from benchmarks.paper.views import VirtualPair, data_file, overlaps_of, pose_error
+from benchmarks.scores import Stated
+from benchmarks.study.records import Limit
 from benchmarks.study.study import Record, Result, Unit
-from benchmarks.study.success import Limit, auc
 from scanweld.config import Config, PairsConfig, PrepareConfig
 from scanweld.evaluation.metrics import (
     MAX_ROTATION_DEG,
@@ -134,4 +135,4 @@ def rescored(records: Sequence[Record], name: str) -> tuple[list[bool], float]:
         firsts.append(bool(kept) and right[int(np.argmax(values))])
         scores += values
         is_right += right
-    return firsts, auc(scores, is_right)
+    return firsts, Stated.of(zip(scores, is_right, strict=True)).auc

@@ -1,9 +1,8 @@
-"""Pages of the study: for each a template of prose, and a module that computes what fills it."""
+"""Pages of the study: for each a template, and a module of what the template asks for."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
 
 from benchmarks.study.pages import rendered
 from benchmarks.study.study import Record
@@ -12,22 +11,23 @@ from scanweld.io.atomic import write_whole
 FOLDER = Path(__file__).parent
 
 
-class Page(Protocol):
-    """What a module of this folder offers."""
-
-    def values(self, records: Sequence[Record], out: Path) -> Mapping[str, Any]:
-        """What fills the template of its name; its pictures go into the folder ``out``."""
-        ...
-
-
 def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) -> None:
-    """Write the page of a table of the study, and the pictures on it."""
+    """Write the page of a table of the study, and the pictures on it.
+
+    The template sees ``records`` and all names of the module that measures the table and of the one
+    that tells of it. If the latter has pictures, its ``draw(records, out)`` draws them, and gives a
+    mapping of what else the template sees.
+    """
     out.mkdir(parents=True, exist_ok=True)
-    page: Page = import_module(f"{__name__}.{name}")  # type: ignore[assignment]  # a module
+    measuring, telling = (import_module(f"benchmarks.paper{at}.{name}") for at in ("", ".pages"))
+    drawn = telling.draw(records, out) if hasattr(telling, "draw") else {}
     command = f"python -m benchmarks.paper --only {name}" + (" --quick" if quick else "")
-    wrote = f"`{command}` wrote this page and [the records](data/{name}.json) behind it."
-    missing = sorted({module for r in records for module in r.unit.get("missing", ())})
-    values = {"wrote": wrote, "missing": missing, **page.values(records, out)}
+    told = {
+        "wrote": f"`{command}` wrote this page and [the records](data/{name}.json) behind it.",
+        "missing": sorted({module for r in records for module in r.unit.get("missing", ())}),
+        "records": records,
+    }
+    values = vars(measuring) | vars(telling) | told | (drawn or {})
     text = rendered(FOLDER / f"{name}.md", values).rstrip() + "\n"
     write_whole(out / f"{name}.md", text.encode())
 

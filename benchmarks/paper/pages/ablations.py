@@ -1,69 +1,28 @@
-"""What stands on the page of the ablations."""
+"""What the page of the ablations tells of its records."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.paper.ablations.parts import (
-    ALONE,
-    CLOSED,
-    COARSE,
-    CONTOURS,
-    HEAT,
-    PERCENTILES,
-    PRUNED,
-    PUBLISHED,
-    REPEATED_DIAMETERS,
-    RIGHT_DIAMETERS,
-    TERMS,
-    TERMS_NOISE,
-    TERMS_START_DEG,
-)
-from benchmarks.paper.ablations.search import (
-    ANCHORS,
-    RIGHT,
-    THIN_OVERLAPS,
-    WEIGHTS,
-    rescored,
-)
-from benchmarks.study.pages import grid, percent
-from benchmarks.study.records import of, values_of
-from benchmarks.study.study import Record
-from benchmarks.study.success import Answer, Limit, cell, share_right
+from benchmarks.paper.ablations import parts
+from benchmarks.paper.ablations.search import RIGHT, rescored
+from benchmarks.paper.settings import COARSE_RIGHT, CONVERGED
+from benchmarks.study.pages import percent
+from benchmarks.study.records import Answer, Records, grouped, of, values_of
 from scanweld.geometry.arrays import FloatArray
 
-Records = Sequence[Record]
-
-CONVERGED = Limit(deg=2.0, percent=1.0)
-COARSE_RIGHT = Limit(deg=5.0, percent=2.0)
-_WHAT = {"repeated": "repeated", "right by eq. 1": "matched"}
+KEYPOINTS = {"repeated": "repeated", "right by eq. 1": "matched"}
+"""What is asked of keypoints, by its title."""
 
 
-def values(records: Records, out: Path) -> Mapping[str, Any]:
-    """What fills the template: a part of it for each ablation."""
-    tell = {
-        "contours": _contours,
-        "terms": _terms,
-        "heat": _heat,
-        "coarse": _coarse,
-        "search": _search,
-    }
-    return {part: of_part(of(records, part=part)) for part, of_part in tell.items()}
+def widest(records: Records) -> Records:
+    """The pairs at the widest gap."""
+    return of(records, gap=max(values_of(records, "gap")))
 
 
-def _by_gap(records: Records) -> dict[int, Records]:
-    return {gap: of(records, gap=gap) for gap in values_of(records, "gap")}
-
-
-def _same(names: Iterable[str]) -> dict[str, str]:
-    return {name: name for name in names}
-
-
-def _columns(records: Records) -> dict[str, Records]:
-    """A column for each gap, and one for all."""
-    return {f"{gap}° apart": r for gap, r in _by_gap(records).items()} | {"all": records}
+def gaps_and_all(records: Records) -> dict[str, Records]:
+    """The pairs by their gap, and all together."""
+    return {**grouped(records, "gap", "{}° apart"), "all": records}
 
 
 def contour_errors(records: Records, variant: str) -> list[Answer]:
@@ -71,37 +30,20 @@ def contour_errors(records: Records, variant: str) -> list[Answer]:
     return [error for record in records for error in record.result["errors"][variant]]
 
 
-def apart(records: Records, prunings: str) -> FloatArray:
+def contours_right(records: Records, variant: str) -> str:
+    """Share of the runs of a variant of MM-ICC that come right."""
+    return percent(CONVERGED.share(contour_errors(records, variant)))
+
+
+def contour_cell(records: Records, variant: str) -> str:
+    """Right runs of a variant of MM-ICC."""
+    return CONVERGED.cell(contour_errors(records, variant))
+
+
+def apart(records: Records, prunings: str) -> list[str]:
     """Percentiles of the distance of true contours in pixels, medians over the pairs."""
-    return np.median([record.result["apart"][prunings] for record in records], axis=0)
-
-
-def _contours(records: Records) -> dict[str, Any]:
-    by_gap = _by_gap(records)
-    share = {
-        name: percent(share_right(contour_errors(records, name), CONVERGED)) for name in CONTOURS
-    }
-    return {
-        "limit": CONVERGED,
-        "starts": " and ".join(f"{start}°" for start in records[0].unit["starts"]),
-        "published": share[PUBLISHED],
-        "share": share,
-        "gap": max(by_gap),
-        "apart": {name: f"{apart(by_gap[max(by_gap)], name)[-1]:.1f}" for name in PRUNED},
-        "percentiles": ", ".join(map(str, PERCENTILES)),
-        "table": grid(
-            "variant",
-            _same(CONTOURS),
-            _columns(records),
-            lambda name, chosen: cell(contour_errors(chosen, name), CONVERGED),
-        ),
-        "apart_table": grid(
-            "prunings",
-            _same(PRUNED),
-            {f"{gap}° apart": chosen for gap, chosen in by_gap.items()},
-            lambda name, chosen: " / ".join(f"{value:.1f}" for value in apart(chosen, name)),
-        ),
-    }
+    told = np.median([record.result["apart"][prunings] for record in records], axis=0)
+    return [f"{value:.1f}" for value in told]
 
 
 def term_errors(records: Records, name: str) -> FloatArray:
@@ -109,27 +51,27 @@ def term_errors(records: Records, name: str) -> FloatArray:
     return np.array([record.result["errors"][name] for record in records]).T
 
 
-def _terms(records: Records) -> dict[str, Any]:
-    def cell(name: str, chosen: Records) -> str:
-        deg, shift = term_errors(chosen, name)
-        return f"{np.median(deg):.3f} ({np.percentile(deg, 90):.2f}), {np.median(shift):.3f} %"
+def term_middles(records: Records) -> dict[str, float]:
+    """Median rotation errors by the terms."""
+    names = (parts.ALONE, *parts.TERMS)
+    return {name: float(np.median(term_errors(records, name)[0])) for name in names}
 
-    by_gap, names = _by_gap(records), (ALONE, *TERMS)
-    widest = by_gap[max(by_gap)]
-    middle = {name: float(np.median(term_errors(widest, name)[0])) for name in names}
-    columns = {
-        f"{gap}° (overlap {np.median([r.result['overlap'] for r in chosen]):.2f})": chosen
-        for gap, chosen in by_gap.items()
+
+def term_cell(records: Records, name: str) -> str:
+    """Median and 90th percentile of the rotation, median of the shift."""
+    deg, shift = term_errors(records, name)
+    return f"{np.median(deg):.3f} ({np.percentile(deg, 90):.2f}), {np.median(shift):.3f} %"
+
+
+def with_overlap(records: Records) -> dict[str, Records]:
+    """The pairs by their gap, with the median overlap in the titles."""
+    overlap = {
+        gap: np.median([r.result["overlap"] for r in pairs])
+        for gap, pairs in grouped(records, "gap").items()
     }
     return {
-        "gap": max(by_gap),
-        "best": min(middle, key=lambda name: middle[name]),
-        "medians": ", ".join(f"{name} {value:.2f}°" for name, value in middle.items()),
-        "start": f"{TERMS_START_DEG:g}°",
-        "noise": f"{100 * TERMS_NOISE:g} %",
-        "weight": TERMS["both"]["contour_weight"],
-        "alike": f"{TERMS['both, alike']['contour_weight']:g}",
-        "table": grid("terms", _same(names), columns, cell),
+        f"{gap}° (overlap {overlap[gap]:.2f})": pairs
+        for gap, pairs in grouped(records, "gap").items()
     }
 
 
@@ -144,76 +86,55 @@ def heat_cell(records: Records, name: str, what: str) -> str:
     return f"{percent(right / asked)} ({percent(by_chance / asked)})" if asked else "-"
 
 
-def _heat(records: Records) -> dict[str, Any]:
-    def gain(name: str) -> float:
+def heat_gains(records: Records) -> dict[str, float]:
+    """How far above chance keypoints repeat, by the surface, in points; the most first."""
+    gains = {}
+    for name in parts.HEAT:
         right, asked, by_chance = heat_totals(records, name, "repeated")
-        return (right - by_chance) / asked if asked else 0.0
+        gains[name] = 100 * (right - by_chance) / asked if asked else 0.0
+    return dict(sorted(gains.items(), key=lambda entry: -entry[1]))
 
-    def cell(name: str, column: tuple[str, Records]) -> str:
-        what, chosen = column
-        if what == "keypoints":
-            return f"{np.mean([k for r in chosen for k in r.result[name][what]]):.0f}"
-        return heat_cell(chosen, name, what)
 
-    best = max(HEAT, key=gain)
-    columns = {"keypoints a view": ("keypoints", records)}
-    columns |= {
-        f"{title}, {gap}°": (what, chosen)
-        for title, what in _WHAT.items()
-        for gap, chosen in _by_gap(records).items()
+def keypoints_a_view(records: Records, name: str) -> str:
+    """Mean number of keypoints on a surface."""
+    return f"{np.mean([k for r in records for k in r.result[name]['keypoints']]):.0f}"
+
+
+def coarse_cell(records: Records, name: str) -> str:
+    """Right coarse poses in a reading of the published step."""
+    return COARSE_RIGHT.cell([record.result[name] for record in records])
+
+
+def by_kind(records: Records) -> dict[str, Records]:
+    """Virtual views by their gap, real pairs by their object, and all together."""
+    virtual = [r for r in records if "gap" in r.unit]
+    real = [r for r in records if "gap" not in r.unit]
+    scans = {
+        f"{name.removeprefix('stanford-')} scans": own
+        for name, own in grouped(real, "object").items()
     }
-    return {
-        "best": best,
-        "best_gain": f"{100 * gain(best):.0f}",
-        "closed": CLOSED,
-        "closed_gain": f"{100 * gain(CLOSED):.0f}",
-        "matched": ", ".join(f"{name}: {heat_cell(records, name, 'matched')}" for name in HEAT),
-        "repeated": f"{100 * REPEATED_DIAMETERS:g} %",
-        "right": f"{100 * RIGHT_DIAMETERS:g} %",
-        "table": grid("surface", _same(HEAT), columns, cell),
-    }
+    return {**grouped(virtual, "gap", "{}° apart"), **scans, "all": records}
 
 
-def _coarse(records: Records) -> dict[str, Any]:
-    return {
-        "limit": COARSE_RIGHT,
-        "table": grid(
-            "reading",
-            _same(COARSE),
-            _columns(records),
-            lambda name, chosen: cell([r.result[name] for r in chosen], COARSE_RIGHT),
-        ),
-    }
+def first_right(records: Records, anchors: str) -> str:
+    """How often the first answer is right with some of the anchors."""
+    kept = [record.result[anchors][:1] for record in records]
+    return _share([any(map(RIGHT.holds, each)) for each in kept])
 
 
-def _search(records: Records) -> dict[str, Any]:
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        gap = record.unit.get("gap")
-        real = f"{record.unit['object'].removeprefix('stanford-')} scans"
-        groups.setdefault(f"{gap}° apart" if gap else real, []).append(record)
-    groups["all"] = list(records)
+def mean_anchors(records: Records) -> float:
+    """Mean number of keypoints of a scan."""
+    return float(np.mean([record.result["anchors"] for record in records]))
 
-    def first(kind: str, chosen: Records) -> str:
-        answers = [record.result[kind] for record in chosen]
-        return _share([bool(kept) and RIGHT.holds(kept[0]) for kept in answers])
 
-    def rescored_cell(name: str, chosen: Records | None) -> str:
-        if chosen is None:
-            return f"{rescored(records, name)[1]:.3f}"
-        return _share(rescored(chosen, name)[0])
+def first_by(records: Records, score: str) -> str:
+    """How often the best pose by a score is right."""
+    return _share(rescored(records, score)[0])
 
-    bare, full = (rescored(records, name) for name in ("agreement alone", "as it stands"))
-    return {
-        "limit": RIGHT,
-        "first": {kind: first(kind, records) for kind in ANCHORS.values()},
-        "anchors": f"{np.mean([record.result['anchors'] for record in records]):.0f}",
-        "thin": THIN_OVERLAPS,
-        "anchors_table": grid("anchors", ANCHORS, groups, first),
-        "bare": {"first": _share(bare[0]), "auc": f"{bare[1]:.3f}"},
-        "full": {"first": _share(full[0]), "auc": f"{full[1]:.3f}"},
-        "table": grid("score", _same(WEIGHTS), {**groups, "AUC": None}, rescored_cell),
-    }
+
+def auc_of(records: Records, score: str) -> str:
+    """AUC of a score over all poses that were kept."""
+    return f"{rescored(records, score)[1]:.3f}"
 
 
 def _share(is_right: Sequence[bool]) -> str:

@@ -1,58 +1,30 @@
-"""What stands on the page of the basins of convergence."""
+"""What the page of the basins of convergence tells of its records."""
 
-from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.paper.basins import DEFAULT, FROM_A_START, JOINT
 from benchmarks.paper.methods import METHODS
-from benchmarks.study.pages import grid, percent
 from benchmarks.study.plots import Curve, Panel, draw_panels
-from benchmarks.study.records import of, values_of
-from benchmarks.study.study import Record
-from benchmarks.study.success import Answer, Limit, cell, share_right
-
-Records = Sequence[Record]
+from benchmarks.study.records import Answer, Limit, Records, grouped, of, values_of
 
 CONVERGED = Limit(deg=2.0, percent=1.0)
-TITLES = {
-    **{name: METHODS[name].title for name in FROM_A_START},
-    JOINT: "joint refinement",
-    DEFAULT: "default",
-}
+TITLES = {METHODS[name].title: name for name in FROM_A_START}
+TITLES |= {"joint refinement": JOINT, "default": DEFAULT}
 _COLORS = {name: METHODS[name].color for name in (*FROM_A_START, DEFAULT)} | {JOINT: "#9C6ADE"}
 _STRONG = ("m-icc", "mm-icc", DEFAULT)
 
 
-def values(records: Records, out: Path) -> Mapping[str, Any]:
-    """What fills the template; the plot goes to the folder ``out``."""
-    by_gap = {gap: of(records, gap=gap) for gap in values_of(records, "gap")}
-    starts = {f"{start}° off": int(start) for start in records[0].result["answers"]}
-    tried = next(iter(records[0].result["answers"].values()))
-    methods = {title: m for m, title in TITLES.items() if m in tried or m == DEFAULT}
-    _draw(by_gap, list(starts.values()), methods, out / "basins.png")
+def starts_of(records: Records) -> dict[str, int]:
+    """How far off the starts are, in degrees, by their titles."""
+    return {f"{start}° off": int(start) for start in records[0].result["answers"]}
 
-    def share(method: str) -> float:
-        widest, farthest = max(by_gap), max(starts.values())
-        return share_right(answers_from(by_gap[widest], farthest, method), CONVERGED)
 
-    from_a_start = [title for title, method in methods.items() if method != DEFAULT]
-    ranked = sorted(from_a_start, key=lambda title: -share(methods[title]))
-    return {
-        "gap": max(by_gap),
-        "start": max(starts.values()),
-        "ranked": ", ".join(f"{title} {percent(share(methods[title]))}" for title in ranked),
-        "default": percent(share(DEFAULT)),
-        "objects": " and ".join(values_of(records, "object")),
-        "limit": CONVERGED,
-        "tables": {
-            gap: grid("method", methods, starts, partial(_cell, at_gap))
-            for gap, at_gap in by_gap.items()
-        },
-    }
+def methods_of(records: Records) -> dict[str, str]:
+    """The methods that were tried, by their titles."""
+    tried = {DEFAULT, *next(iter(records[0].result["answers"].values()))}
+    return {title: method for title, method in TITLES.items() if method in tried}
 
 
 def answers_from(records: Records, start: int, method: str) -> list[Answer]:
@@ -63,27 +35,28 @@ def answers_from(records: Records, start: int, method: str) -> list[Answer]:
     return [result["answers"][str(start)][method] for result in results]
 
 
-def _cell(records: Records, method: str, start: int) -> str:
-    return cell(answers_from(records, start, method), CONVERGED)
+def hardest(records: Records) -> dict[str, float]:
+    """Shares that come right from the farthest start at the widest gap, the highest first."""
+    widest = of(records, gap=max(values_of(records, "gap")))
+    farthest = max(starts_of(records).values())
+    shares = {
+        title: CONVERGED.share(answers_from(widest, farthest, method))
+        for title, method in methods_of(records).items()
+    }
+    return dict(sorted(shares.items(), key=lambda entry: -entry[1]))
 
 
-def _draw(
-    by_gap: Mapping[int, Records], starts: Sequence[int], methods: Mapping[str, str], path: Path
-) -> None:
+def draw(records: Records, out: Path) -> None:
+    """Share of right answers against the start, a panel for each gap."""
+    starts, methods = starts_of(records).values(), methods_of(records)
     panels = []
-    for gap, records in by_gap.items():
-        curves = {}
-        for n, (title, method) in enumerate(methods.items()):
-            told = [answers_from(records, start, method) for start in starts]
+    for title, at_gap in grouped(records, "gap", "views {}° apart").items():
+        panel = Panel(title, {start: str(start) for start in starts})
+        for n, (name, method) in enumerate(methods.items()):
+            told = [CONVERGED.share(answers_from(at_gap, start, method)) for start in starts]
             # Curves that coincide are drawn a hair apart, so that all are seen.
-            apart = 0.007 * (n - len(methods) / 2)
-            curves[title] = Curve(
-                places=starts,
-                shares=np.array([share_right(each, CONVERGED) for each in told]) + apart,
-                color=_COLORS[method],
-                style="--" if method == DEFAULT else "-",
-                strong=method in _STRONG,
-            )
-        ticks = {start: str(start) for start in starts}
-        panels.append(Panel(title=f"views {gap}° apart", curves=curves, ticks=ticks))
-    draw_panels(path, [panels], "start, degrees off", "right poses (%)")
+            shares = np.array(told) + 0.007 * (n - len(methods) / 2)
+            style = "--" if method == DEFAULT else "-"
+            panel.curves[name] = Curve(shares, _COLORS[method], style, method in _STRONG)
+        panels.append(panel)
+    draw_panels(out / "basins.png", [panels], "start, degrees off", "right poses (%)")

@@ -1,20 +1,21 @@
-"""What stands on the page of the real pairs."""
+"""What the page of the real pairs tells of its records."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.paper.methods import BY_TITLE, METHODS, curve
-from benchmarks.paper.views import MADE
-from benchmarks.study.pages import grid
+from benchmarks.scores import Stated
 from benchmarks.study.plots import Panel, draw_panels
-from benchmarks.study.records import answers, of, overlap_title, overlapping, values_of
-from benchmarks.study.study import Record
-from benchmarks.study.success import Answer, Limit, auc, cell, share_right
-
-Records = Sequence[Record]
+from benchmarks.study.records import (
+    Answer,
+    Limit,
+    Records,
+    answers,
+    overlap_title,
+    overlapping,
+)
 
 BASIN = Limit(deg=5, percent=2)
 TIGHT = Limit(deg=2, percent=1)
@@ -23,65 +24,29 @@ HALVES = ((0.15, 1.01), (0.05, 0.15), (0.0, 0.05))
 """What the words speak of."""
 
 
-def values(records: Records, out: Path) -> Mapping[str, Any]:
-    """What fills the template; the plot goes to the folder ``out``."""
-    _draw(records, out / "real_pairs.png")
-    by_object = {name: of(records, object=name) for name in values_of(records, "object")}
-    accepted = [each for each in answers(records, "default") if each["accepted"]]
-    return {
-        "num": len(records),
-        "counts": ", ".join(f"{len(own)} of the {name}" for name, own in by_object.items()),
-        "is_made": list(by_object) == [MADE],
-        "halves": {
-            overlap_title(*edges): _in_words(inside)
-            for edges in HALVES
-            if (inside := overlapping(records, *edges))
-        },
-        "accepted": len(accepted),
-        "accepted_wrong": sum(not BASIN.holds(answer) for answer in accepted),
-        "basin": BASIN,
-        "tight": TIGHT,
-        "in_basin": _by_overlap(records, BASIN),
-        "right": _by_overlap(records, TIGHT),
-        "by_object": {
-            name: _by_overlap(own, TIGHT) for name, own in by_object.items() if len(by_object) > 1
-        },
-        "scores": grid("", _tried(records), _SCORES, lambda told, column: column(told)),
-    }
+def by_overlap(records: Records, bins: Sequence[tuple[float, float]]) -> dict[str, Records]:
+    """The pairs by their overlap, as far as there are any."""
+    inside = {overlap_title(*edges): overlapping(records, *edges) for edges in bins}
+    return {title: chosen for title, chosen in inside.items() if chosen}
 
 
-def _tried(records: Records) -> dict[str, list[Answer]]:
+def tried(records: Records) -> dict[str, list[Answer]]:
     """The answers of all methods that were tried, by their titles."""
     told = {title: answers(records, method) for title, method in BY_TITLE.items()}
     return {title: of_method for title, of_method in told.items() if of_method}
 
 
-def _in_words(records: Records) -> dict[str, str]:
-    """How often the default is right, and which of the others does best."""
-    told = _tried(records)
-    default = told.pop(METHODS["default"].title)
-    best = max(told, key=lambda title: share_right(told[title], BASIN))
-    is_any = share_right(told[best], BASIN) > 0
-    return {
-        "default": BASIN.count(default),
-        "best": best if is_any else "",
-        "best_count": BASIN.count(told[best]),
-    }
-
-
-def _bins(records: Records) -> dict[str, Records]:
-    """The pairs by their overlap, as far as there are any."""
-    inside = {overlap_title(*edges): overlapping(records, *edges) for edges in BINS}
-    return {title: chosen for title, chosen in inside.items() if chosen}
-
-
-def _by_overlap(records: Records, limit: Limit) -> str:
-    return grid("overlap", BY_TITLE, _bins(records), lambda m, r: cell(answers(r, m), limit))
+def best_but_default(records: Records) -> tuple[str, list[Answer]] | None:
+    """Which of the other methods is right most often, and its answers; None if all are wrong."""
+    told = tried(records)
+    del told[METHODS["default"].title]
+    best = max(told, key=lambda title: BASIN.share(told[title]))
+    return (best, told[best]) if BASIN.share(told[best]) > 0 else None
 
 
 def _auc(told: Sequence[Answer]) -> str:
     given = [each for each in told if each["deg"] is not None]
-    value = auc([each["score"] for each in given], [BASIN.holds(each) for each in given])
+    value = Stated.of((each["score"], BASIN.holds(each)) for each in given).auc
     return "-" if np.isnan(value) else f"{value:.3f}"
 
 
@@ -93,7 +58,7 @@ def _accepted(told: Sequence[Answer], wrong_only: bool) -> str:
     return str(sum(not (wrong_only and BASIN.holds(each)) for each in accepted))
 
 
-_SCORES = {
+SCORES = {
     "CPU seconds": lambda told: f"{np.median([each['seconds'] for each in told]):.2f}",
     "no answer": lambda told: str(sum(each["deg"] is None for each in told)),
     "AUC": _auc,
@@ -102,18 +67,12 @@ _SCORES = {
 }
 
 
-def _draw(records: Records, path: Path) -> None:
+def draw(records: Records, out: Path) -> None:
     """Share of pairs in the right basin by overlap, a line for each method."""
-    bins = dict(reversed(_bins(records).items()))
-    places = list(range(len(bins)))
-    curves = {
-        title: curve(
-            method,
-            places,
-            [share_right(answers(inside, method), BASIN) for inside in bins.values()],
-        )
-        for title, method in BY_TITLE.items()
-    }
+    bins = by_overlap(records, BINS[::-1])
     titles = [f"{title}\n{len(inside)} pairs" for title, inside in bins.items()]
-    panel = Panel(title="", curves=curves, ticks=dict(zip(places, titles, strict=True)))
-    draw_panels(path, [[panel]], "overlap", f"right answers, {BASIN} (%)")
+    panel = Panel("", dict(enumerate(titles)))
+    for title, method in BY_TITLE.items():
+        shares = [BASIN.share(answers(inside, method)) for inside in bins.values()]
+        panel.curves[title] = curve(method, shares)
+    draw_panels(out / "real_pairs.png", [[panel]], "overlap", f"right answers, {BASIN} (%)")
