@@ -5,6 +5,7 @@ from functools import lru_cache
 
 from scipy.spatial import KDTree
 
+from benchmarks.features.spectrum import Spectrum, spectrum_of
 from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.prepared import PreparedScan
@@ -12,7 +13,6 @@ from scanweld.heat.artificial_mesh import ArtificialMesh, close_front
 from scanweld.heat.features import move_off_rims
 from scanweld.heat.front import FrontMesh, thin_front
 from scanweld.heat.keypoints import group, persistent_maxima
-from scanweld.heat.laplacian import eigenpairs
 from scanweld.heat.signature import diffusion_times, heat_signature
 
 _NEIGHBOURS = 4
@@ -25,6 +25,7 @@ class HeatField:
     Attributes:
         front: The thinned measured surface.
         mesh: Closed by walls and a back plane.
+        spectrum: Eigenpairs of the closed mesh, on the front's points.
         times: (T,) in squared diameters.
         signature: (N, T) on the front's points.
         found: (K,) front vertices of the persistent maxima that have an anchor off the rims.
@@ -34,30 +35,39 @@ class HeatField:
 
     front: FrontMesh
     mesh: ArtificialMesh
+    spectrum: Spectrum
     times: FloatArray
     signature: FloatArray
     found: IntArray
     moved: IntArray
     grouped: IntArray
 
+    @property
+    def keypoints(self) -> FloatArray:
+        """(G, 3), sensor frame."""
+        return self.front.points[self.grouped]
+
     def on_mesh(self, scan: PreparedScan, time: int) -> FloatArray:
         """The signature at a time on the vertices (V,) of the scan's own, finer mesh."""
         away, near = KDTree(self.front.points).query(scan.mesh.vertices, k=_NEIGHBOURS)
         weight = 1.0 / (away**2 + (0.5 * scan.image.pixel) ** 2)
-        values = self.signature[near, time]
-        return (weight * values).sum(axis=1) / weight.sum(axis=1)
+        return (weight * self.signature[near, time]).sum(axis=1) / weight.sum(axis=1)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def heat_field(scan: PreparedScan) -> HeatField:
     """The heat of a scan, stage by stage, under the default settings."""
     config = HeatConfig()
     front = thin_front(scan.image, config.max_front_vertices)
     mesh = close_front(front, scan.image.camera, scan.diameter)
-    vertices = (mesh.vertices - mesh.vertices.mean(axis=0)) / scan.diameter
-    eigenvalues, functions = eigenpairs(vertices, mesh.faces, config.num_modes)
-    times = diffusion_times(eigenvalues, config.num_times, config.longest_time_diameters2)
-    signature = heat_signature(eigenvalues, functions, times)[: mesh.num_front]
+    whole = spectrum_of(mesh.vertices, mesh.faces, scan.diameter, config.num_modes)
+    spectrum = Spectrum(
+        points=front.points,
+        eigenvalues=whole.eigenvalues,
+        functions=whole.functions[: mesh.num_front],
+    )
+    times = diffusion_times(whole.eigenvalues, config.num_times, config.longest_time_diameters2)
+    signature = heat_signature(spectrum.eigenvalues, spectrum.functions, times)
     maxima = persistent_maxima(
         signature, front.points / scan.diameter, front.faces, config.group_diameters
     )
@@ -67,6 +77,7 @@ def heat_field(scan: PreparedScan) -> HeatField:
     return HeatField(
         front=front,
         mesh=mesh,
+        spectrum=spectrum,
         times=times,
         signature=signature,
         found=maxima.vertices[is_kept],
