@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
+from benchmarks.paper import settings
 from benchmarks.study.pages import rendered
 from benchmarks.study.study import Record
 from scanweld.io.atomic import write_whole
@@ -14,20 +15,20 @@ FOLDER = Path(__file__).parent
 def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) -> None:
     """Write the page of a table of the study, and the pictures on it.
 
-    The template sees ``records`` and all names of the module that measures the table and of the one
-    that tells of it. If the latter has pictures, its ``draw(records, out)`` draws them, and gives a
-    mapping of what else the template sees.
+    The template sees ``records`` and all names of the settings, of the module that measures the
+    table, and of the one that tells of it, whose ``draw(records, out)`` draws the pictures.
     """
     out.mkdir(parents=True, exist_ok=True)
     measuring, telling = (import_module(f"benchmarks.paper{at}.{name}") for at in ("", ".pages"))
-    drawn = telling.draw(records, out) if hasattr(telling, "draw") else {}
+    if hasattr(telling, "draw"):
+        telling.draw(records, out)
     command = f"python -m benchmarks.paper --only {name}" + (" --quick" if quick else "")
     told = {
         "wrote": f"`{command}` wrote this page and [the records](data/{name}.json) behind it.",
         "missing": sorted({module for r in records for module in r.unit.get("missing", ())}),
         "records": records,
     }
-    values = vars(measuring) | vars(telling) | told | (drawn or {})
+    values = vars(settings) | vars(measuring) | vars(telling) | told
     text = rendered(FOLDER / f"{name}.md", values).rstrip() + "\n"
     write_whole(out / f"{name}.md", text.encode())
 

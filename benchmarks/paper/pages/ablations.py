@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.paper.ablations import parts
 from benchmarks.paper.ablations.search import RIGHT, rescored
-from benchmarks.paper.settings import COARSE_RIGHT, CONVERGED
+from benchmarks.paper.settings import CONVERGED
 from benchmarks.study.pages import percent
 from benchmarks.study.records import Answer, Records, grouped, of, values_of
 from scanweld.geometry.arrays import FloatArray
@@ -33,11 +33,6 @@ def contour_errors(records: Records, variant: str) -> list[Answer]:
 def contours_right(records: Records, variant: str) -> str:
     """Share of the runs of a variant of MM-ICC that come right."""
     return percent(CONVERGED.share(contour_errors(records, variant)))
-
-
-def contour_cell(records: Records, variant: str) -> str:
-    """Right runs of a variant of MM-ICC."""
-    return CONVERGED.cell(contour_errors(records, variant))
 
 
 def apart(records: Records, prunings: str) -> list[str]:
@@ -100,9 +95,9 @@ def keypoints_a_view(records: Records, name: str) -> str:
     return f"{np.mean([k for r in records for k in r.result[name]['keypoints']]):.0f}"
 
 
-def coarse_cell(records: Records, name: str) -> str:
-    """Right coarse poses in a reading of the published step."""
-    return COARSE_RIGHT.cell([record.result[name] for record in records])
+def coarse_errors(records: Records, name: str) -> list[Answer]:
+    """Errors of the coarse pose in a reading of the published step."""
+    return [record.result[name] for record in records]
 
 
 def by_kind(records: Records) -> dict[str, Records]:

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.paper import settings
-from benchmarks.paper.settings import NUMERALS, SETTINGS
+from benchmarks.paper.settings import NUMERALS, SETTINGS, TUNED, is_converged
 from benchmarks.study.pages import grid, markdown_table
 from benchmarks.study.records import Records, of, values_of
 from benchmarks.study.study import Record
@@ -32,7 +31,7 @@ def runs(records: Records, **wanted: object) -> list[Run]:
 
 def count(of_runs: Iterable[Run]) -> int:
     """How many runs converge."""
-    return sum(map(settings.is_converged, of_runs))
+    return sum(map(is_converged, of_runs))
 
 
 def share(of_runs: list[Run]) -> str:
@@ -42,7 +41,7 @@ def share(of_runs: list[Run]) -> str:
 
 def rms_percent(record: Record) -> float:
     """Mean RMS of the runs that converged, in % of the diameter; NaN if none did."""
-    right = [run["rms_percent"] for run in record.result["runs"] if settings.is_converged(run)]
+    right = [run["rms_percent"] for run in record.result["runs"] if is_converged(run)]
     return float(np.mean(right)) if right else float("nan")
 
 
@@ -90,7 +89,7 @@ def sweep_table(records: Records) -> tuple[str, dict[str, str]]:
         for record in of(records, method=method):
             of_tuning = counts.setdefault(_tuning_title(record.unit), [0] * len(numerals))
             of_tuning[numerals.index(record.unit["setting"])] += count(record.result["runs"])
-        used = _tuning_title({"method": method, **settings.TUNED[method]})
+        used = _tuning_title({"method": method, **TUNED[method]})
         for tuning, converged in counts.items():
             cells = [tuning, *map(str, converged), str(sum(converged))]
             rows.append([f"**{cell}**" for cell in cells] if tuning == used else cells)
