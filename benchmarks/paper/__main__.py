@@ -22,12 +22,9 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
 from benchmarks.paper.method import write_method
 from benchmarks.paper.pages import write_index, write_page
-from benchmarks.study.study import PACKAGE, Study, Table, measured_by, read_records
+from benchmarks.study.study import PACKAGE, Study, Table, measured, measured_by, read_records
 from scanweld.errors import InputError, ScanweldError
 from scanweld.work.threads import num_workers
 
@@ -35,7 +32,10 @@ TABLES = ("table1", "table2", "real_pairs", "features", "ablations", "basins", "
 """In the order in which they are measured and shown; each is a module of this folder."""
 MEASURING = (
     PACKAGE,
-    *(f"benchmarks/paper/{name}.py" for name in ("views", "settings", "methods", "{table}")),
+    *(
+        f"benchmarks/paper/{name}.py"
+        for name in ("views", "real", "settings", "methods", "{table}")
+    ),
     *(f"benchmarks/paper/{name}/*.py" for name in ("baselines", "{table}")),
 )
 USAGE_ERROR = 2
@@ -75,30 +75,18 @@ def table(name: str) -> Table:
 
 def _run(names: Sequence[str], study: Study, *, measure: bool) -> None:
     """Measure table by table, or take what stands, and write each one's page."""
-    tables = [table(name) for name in names]
-    columns = (
-        TextColumn("{task.description}"),
-        *(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()),
-    )
-    with Progress(*columns, console=Console(stderr=True), disable=not measure) as progress:
-        for one in tables:
-            if measure:
-                task = progress.add_task(one.NAME, total=None)
-                records = study.records(
-                    one, lambda done, total, t=task: progress.update(t, completed=done, total=total)
-                )
-                study.write(one, records)
-            with measured_by(f"--only {one.NAME}"):
-                records = read_records(study.out, one.NAME)
-            write_page(one.NAME, records, study.out, quick=study.quick)
+    for one in [table(name) for name in names]:
+        if measure:
+            study.write(one, measured(one, study))
+        with measured_by(f"--only {one.NAME}"):
+            records = read_records(study.out, one.NAME)
+        write_page(one.NAME, records, study.out, quick=study.quick)
     write_index(TABLES, study.out)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.paper",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join(TABLES))
     parser.add_argument("--quick", action="store_true", help="a handful of units, no data needed")

@@ -1,12 +1,12 @@
 """Basins of convergence: how far from the truth a method may start."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
 
 from benchmarks.paper.baselines.own import jointly_refined
 from benchmarks.paper.methods import need_all, try_methods
-from benchmarks.paper.views import MADE, VirtualPair, pair_units, virtual_pair
+from benchmarks.paper.views import MADE, Error, KnownPair, pair_units, virtual_pair
 from benchmarks.study.study import Result, Unit
+from scanweld.geometry.pose import Pose
 
 NAME = "basins"
 
@@ -34,16 +34,15 @@ def units(quick: bool) -> list[Unit]:
 def measure(unit: Unit) -> Result:
     """What all methods make of a pair, from poses farther and farther from the truth."""
     pair, seed = virtual_pair(unit["object"], unit["azimuth"], unit["gap"]), unit["azimuth"]
-    methods = unit.get("methods", FROM_A_START)
-    answers: dict[str, dict[str, Any]] = {}
+    answers = {}
     for degrees in unit["starts"]:
         start = pair.start(degrees, seed)
-        poses = jointly_refined((pair.i.scan, pair.j.scan), start)
-        joint = pair.error(poses[0].inverse() @ poses[1])
-        answers[str(degrees)] = {**_tried(pair, methods, start[1], seed), JOINT: joint}
-    return {"answers": answers, **_tried(pair, [DEFAULT], pair.true, seed)}
+        poses = jointly_refined((pair.i, pair.j), start)
+        tried = _errors(pair, unit.get("methods", FROM_A_START), start[1], seed)
+        answers[str(degrees)] = {**tried, JOINT: pair.error(poses[0].inverse() @ poses[1])}
+    return {"answers": answers, **_errors(pair, [DEFAULT], pair.true, seed)}
 
 
-def _tried(pair: VirtualPair, methods: Any, start: Any, seed: int) -> dict[str, Mapping[str, Any]]:
-    tried = try_methods(methods, pair.scans, start, pair.true, pair.i.diameter, seed)
+def _errors(pair: KnownPair, methods: Sequence[str], start: Pose, seed: int) -> dict[str, Error]:
+    tried = try_methods(methods, pair, start, seed)
     return {name: {key: each[key] for key in ("deg", "percent")} for name, each in tried.items()}

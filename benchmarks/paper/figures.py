@@ -23,9 +23,10 @@ from benchmarks.paper.settings import (
 )
 from benchmarks.paper.views import (
     MADE,
-    VirtualPair,
+    KnownPair,
     VirtualScan,
     data_file,
+    known_pair,
     overlap_of,
     virtual_scan,
 )
@@ -106,10 +107,10 @@ def subject(name: str, azimuth_deg: float | None) -> PreparedScan:
     return prepare(read_scan(data_file(f"stanford-bunny/{name}.ply")), PrepareConfig())
 
 
-def pair_of(unit: Unit) -> VirtualPair:
+def pair_of(unit: Unit) -> KnownPair:
     """The first two views that a figure shows."""
     i, j = (virtual_scan(unit["object"], azimuth) for azimuth in unit["azimuths_deg"])
-    return VirtualPair(i, j)
+    return known_pair(i, j)
 
 
 def _keypoints(unit: Unit) -> Result:
@@ -131,7 +132,7 @@ def _keypoints(unit: Unit) -> Result:
 def _contours(unit: Unit) -> Result:
     """Which contour points each pruning takes, at the true pose; pixels (u, v) of camera j."""
     pair, config = pair_of(unit), ContoursConfig()
-    i, j, j_from_i = pair.i.scan, pair.j.scan, pair.true.inverse()
+    i, j, j_from_i = pair.i, pair.j, pair.true.inverse()
     a, b = observe_contours(i, config), observe_contours(j, config)
     predicted, corners = predict_contours(a, b, j_from_i)
     own = prune_self_occlusion(corners, a.is_border)
@@ -220,7 +221,7 @@ def _chained(views: Sequence[VirtualScan], name: str) -> dict[int, Pose] | None:
     """Poses along the chain of adjacent views by a pair method; None if a pair has none."""
     poses = {0: Pose.identity()}
     for k, (i, j) in enumerate(pairwise(views)):
-        found = METHODS[name].run(VirtualPair(i, j).scans, Pose.identity(), 0).i_from_j
+        found = METHODS[name].run(known_pair(i, j).scans, Pose.identity(), 0).i_from_j
         if found is None:
             return None
         poses[k + 1] = poses[k] @ found

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.paper.baselines import cpd, fpfh, gicp, kiss, own
-from benchmarks.paper.baselines.records import Method, ScanPair
-from benchmarks.paper.views import pose_error
+from benchmarks.paper.baselines.records import Method
+from benchmarks.paper.views import KnownPair
 from benchmarks.study.optional import is_usable, need
 from benchmarks.study.plots import Curve
 from scanweld.geometry.pose import Pose
@@ -52,7 +52,6 @@ METHODS: dict[str, Entry] = {
     "default": Entry("scanweld", own.default, "#1B6CA8"),
 }
 """In the order in which tables show them."""
-
 BY_TITLE = {entry.title: name for name, entry in METHODS.items()}
 
 
@@ -62,46 +61,38 @@ def curve(name: str, shares: Sequence[float]) -> Curve:
 
 
 def try_methods(
-    names: Iterable[str], pair: ScanPair, start: Pose, true: Pose, diameter: float, seed: int
+    names: Iterable[str], pair: KnownPair, start: Pose, seed: int
 ) -> dict[str, dict[str, Any]]:
-    """Run methods on a pair, one after the other.
+    """Run methods on a pair, one after the other, but for those whose library is not there.
 
     Args:
         names: Of the methods.
         pair: The scans.
         start: Pose i_from_j of those methods that start at one.
-        true: The true i_from_j.
-        diameter: Of the object, for the error.
         seed: Of those methods that draw random numbers.
 
     Returns:
-        By name: "deg" and "percent" (of the diameter, at the middle of j) of the error, both None
-        where the method gives no pose; its "score"; whether it was "accepted", where the method
-        says so; and its CPU "seconds".
+        By name: "deg" and "percent" of the error, the method's "score", whether it "accepted" its
+        pose, where it says so, and its CPU "seconds".
     """
-    centre = pair.j.samples.points.mean(axis=0)
     tried: dict[str, dict[str, Any]] = {}
+    missing = missing_modules()
     for name in names:
+        if missing.intersection(METHODS[name].needs):
+            continue
         began = time.process_time()
-        answer = METHODS[name].run(pair, start, seed)
+        answer = METHODS[name].run(pair.scans, start, seed)
         seconds = time.process_time() - began
-        error = pose_error(true, answer.i_from_j, centre, diameter)
-        tried[name] = {**error, "score": answer.score, "seconds": seconds}
+        tried[name] = {**pair.error(answer.i_from_j), "score": answer.score, "seconds": seconds}
         if answer.accepted is not None:
             tried[name]["accepted"] = answer.accepted
     return tried
 
 
-def missing_modules(names: Iterable[str]) -> list[str]:
-    """Modules that the methods of these names need and that cannot be used here."""
-    needed = {module for name in names for module in METHODS[name].needs}
-    return sorted(module for module in needed if not is_usable(module))
-
-
-def without(names: Iterable[str], missing: Iterable[str]) -> list[str]:
-    """The methods that need none of the missing modules."""
-    gone = set(missing)
-    return [name for name in names if not gone.intersection(METHODS[name].needs)]
+def missing_modules() -> set[str]:
+    """Modules that some methods need and that cannot be used here."""
+    needed = {module for entry in METHODS.values() for module in entry.needs}
+    return {module for module in needed if not is_usable(module)}
 
 
 def need_all(names: Iterable[str]) -> None:

@@ -1,17 +1,16 @@
-"""Virtual scans of the study's objects, pairs of them, starts and errors; all in sensor frames."""
+"""Virtual scans of the study's objects, pairs whose truth is known, starts and errors."""
 
-import csv
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from benchmarks.paper.baselines.records import ScanPair
+from benchmarks.sets import data_folder
 from benchmarks.study.study import Unit
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
@@ -33,18 +32,14 @@ PIXELS = 240.0
 """Across the object's diameter, as in the study on which the design rests."""
 UP: dict[str, Axis] = {"armadillo": "y", "bunny": "y", MADE: "z"}
 """The axis that the views of an object go around."""
-DEFAULT_DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
+
+Error = dict[str, float | None]
+"""By how many degrees a pose is off ("deg"), and "percent" of the diameter; None without a pose."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class VirtualScan:
-    """A scan ready for registration, and where its sensor stood.
-
-    Attributes:
-        scan: Its scan frame is the sensor's.
-        world_from_sensor: The world is the mesh's frame.
-        diameter: Of the object.
-    """
+    """A scan in its sensor's frame, where that stood in the mesh's, and the object's diameter."""
 
     scan: PreparedScan
     world_from_sensor: Pose
@@ -59,60 +54,53 @@ class VirtualScan:
         return self.scan.samples.points.mean(axis=0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VirtualPair:
-    """Two virtual scans of one object."""
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class KnownPair:
+    """Two scans, the true i_from_j of their sensors, and the diameter of their object."""
 
-    i: VirtualScan
-    j: VirtualScan
-
-    @property
-    def true(self) -> Pose:
-        """The true i_from_j."""
-        return self.i.from_other(self.j)
+    i: PreparedScan
+    j: PreparedScan
+    true: Pose
+    diameter: float
 
     @property
     def scans(self) -> ScanPair:
         """The pair as methods take it, with the diameter that a run on these scans would take."""
-        i, j = self.i.scan, self.j.scan
-        return ScanPair(i=i, j=j, diameter=(i.diameter + j.diameter) / 2)
+        return ScanPair(i=self.i, j=self.j, diameter=(self.i.diameter + self.j.diameter) / 2)
+
+    @property
+    def centre(self) -> FloatArray:
+        """(3,) middle of the samples of j."""
+        return self.j.samples.points.mean(axis=0)
 
     def start(self, degrees: float, seed: int) -> dict[int, Pose]:
         """The true poses in the frame of i, j turned about its middle by a random axis."""
-        return {0: Pose.identity(), 1: disturbed(self.true, self.j.centre(), degrees, seed)}
+        return {0: Pose.identity(), 1: disturbed(self.true, self.centre, degrees, seed)}
 
-    def error(self, i_from_j: Pose | None) -> dict[str, float | None]:
-        """How far a pose is off: "deg", and "percent" of the object's diameter."""
-        return pose_error(self.true, i_from_j, self.j.centre(), self.i.diameter)
+    def any_start(self, seed: int) -> Pose:
+        """An i_from_j that turns j at random about its middle, which is laid on that of i."""
+        rotation = random_rotation(np.random.default_rng([seed, 7]))
+        middle = self.i.samples.points.mean(axis=0)
+        return Pose(rotation=rotation, translation=middle - rotation @ self.centre)
+
+    def error(self, i_from_j: Pose | None) -> Error:
+        """How far a pose is off."""
+        return pose_error(self.true, i_from_j, self.centre, self.diameter)
 
 
 def data_file(relative: str) -> Path:
-    """A file of the Stanford data, below SCANWELD_DATA or else beside the project.
+    """A file of the Stanford data.
 
     Raises:
         InputError: If it is missing.
     """
-    path = Path(os.environ.get("SCANWELD_DATA", DEFAULT_DATA)) / relative
+    path = data_folder(None) / relative
     if not path.exists():
         raise InputError(
             f"{path}: is missing; put it there, set SCANWELD_DATA to the folder of the data, or "
             "take --quick, which needs none"
         )
     return path
-
-
-def overlaps_of(folder: str) -> list[dict[str, Any]]:
-    """The pairs of real scans in a folder: names "i" and "j", "overlap", "gap" in degrees."""
-    with data_file(f"{folder}/overlaps.csv").open(encoding="utf-8") as file:
-        return [
-            {
-                "i": row["i"],
-                "j": row["j"],
-                "overlap": min(float(row["overlap_ij"]), float(row["overlap_ji"])),
-                "gap": float(row["rotation_deg"]),
-            }
-            for row in csv.DictReader(file)
-        ]
 
 
 @lru_cache
@@ -153,10 +141,8 @@ def virtual_scan(
         seed: Of the noise.
     """
     mesh, view = mesh_of(name), camera_view(name, azimuth_deg, roll_deg)
-    model = NoiseModel(depth_diameters=noise)
-    scan = scan_mesh(
-        mesh, view.camera, view.world_from_sensor, model, seed, name=f"{azimuth_deg:g}"
-    )
+    model, title = NoiseModel(depth_diameters=noise), f"{azimuth_deg:g}"
+    scan = scan_mesh(mesh, view.camera, view.world_from_sensor, model, seed, name=title)
     return VirtualScan(
         scan=prepare(scan, PrepareConfig()),
         world_from_sensor=view.world_from_sensor,
@@ -169,30 +155,21 @@ def camera_view(name: str, azimuth_deg: float, roll_deg: float = 0.0) -> View:
     return view_of(mesh_of(name), azimuth_deg, 0.0, roll_deg, pixels=PIXELS, up=UP[name])
 
 
-def virtual_pair(name: str, azimuth: float, gap: float, noise: float = 0.0) -> VirtualPair:
+def known_pair(i: VirtualScan, j: VirtualScan) -> KnownPair:
+    """Two virtual scans of one object."""
+    return KnownPair(i=i.scan, j=j.scan, true=i.from_other(j), diameter=i.diameter)
+
+
+def virtual_pair(name: str, azimuth: float, gap: float, noise: float = 0.0) -> KnownPair:
     """Two scans of an object, a gap apart; the noise of the second has another seed."""
     i = virtual_scan(name, float(azimuth), noise=noise)
-    j = virtual_scan(name, float(azimuth + gap), noise=noise, seed=int(noise > 0))
-    return VirtualPair(i, j)
+    return known_pair(i, virtual_scan(name, float(azimuth + gap), noise=noise, seed=int(noise > 0)))
 
 
 @lru_cache(maxsize=1024)
 def overlap_of(name: str, azimuth_i: float, azimuth_j: float) -> float:
     """Overlap of two views of an object; rolls do not matter."""
     return overlap(mesh_of(name), *(camera_view(name, a) for a in (azimuth_i, azimuth_j)))
-
-
-def start_pose(kind: Literal["identity", "random"], pair: ScanPair, seed: int) -> Pose:
-    """Where a pair starts, i_from_j.
-
-    ``identity`` is the paper's protocol: both scans in their own camera frames. ``random`` turns j
-    by any rotation about its middle, which is laid on the middle of i.
-    """
-    if kind == "identity":
-        return Pose.identity()
-    middle_i, middle_j = (scan.samples.points.mean(axis=0) for scan in (pair.i, pair.j))
-    rotation = random_rotation(np.random.default_rng([seed, 7]))
-    return Pose(rotation=rotation, translation=middle_i - rotation @ middle_j)
 
 
 def disturbed(i_from_j: Pose, centre: FloatArray, degrees: float, seed: int) -> Pose:
@@ -202,10 +179,8 @@ def disturbed(i_from_j: Pose, centre: FloatArray, degrees: float, seed: int) -> 
     return i_from_j @ Pose(rotation=rotation, translation=centre - rotation @ centre)
 
 
-def pose_error(
-    true: Pose, found: Pose | None, centre: FloatArray, diameter: float
-) -> dict[str, float | None]:
-    """Error of i_from_j: "deg", and by how many "percent" of a diameter it puts (3,) of j off."""
+def pose_error(true: Pose, found: Pose | None, centre: FloatArray, diameter: float) -> Error:
+    """Error of i_from_j, its shift at a point (3,) of j."""
     if found is None:
         return {"deg": None, "percent": None}
     off = true.inverse() @ found

@@ -5,15 +5,17 @@ import json
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
-from benchmarks.results import machine
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from benchmarks.results import machine, rounded, write_file
 from scanweld.errors import InputError, ScanweldError
-from scanweld.io.atomic import write_whole
 
 Unit = Mapping[str, Any]
 """What to measure: a small dict that JSON can hold."""
@@ -80,12 +82,11 @@ class Study:
             ScanweldError: If a unit lacks what the user has to bring.
             RuntimeError: If a unit fails. The finished ones are kept.
         """
-        units = table.units(self.quick)
-        code = self._code_digest(table)
+        units, code = table.units(self.quick), self._code_digest(table)
         keys = [_key(code, table, unit) for unit in units]
         store = self.work / f"{table.NAME}.jsonl"
         results = _stored(store)
-        waiting = [(k, unit) for k, unit in zip(keys, units, strict=True) if k not in results]
+        waiting = {key: unit for key, unit in zip(keys, units, strict=True) if key not in results}
         advance(len(units) - len(waiting), len(units))
         for key, result in self._measured(table, waiting):
             _append(store, key, result)
@@ -94,13 +95,6 @@ class Study:
         return [
             Record(unit=unit, result=results[key]) for key, unit in zip(keys, units, strict=True)
         ]
-
-    def finished(self, table: Table) -> list[Record]:
-        """The records that an interrupted study has kept, in the table's order."""
-        code = self._code_digest(table)
-        results = _stored(self.work / f"{table.NAME}.jsonl")
-        found = [(unit, results.get(_key(code, table, unit))) for unit in table.units(self.quick)]
-        return [Record(unit=unit, result=result) for unit, result in found if result is not None]
 
     def write(self, table: Table, records: Sequence[Record]) -> None:
         """Write the records of a table as JSON."""
@@ -113,9 +107,8 @@ class Study:
             "records": [{**record.unit, "result": record.result} for record in records],
         }
         path = self.out / "data" / f"{table.NAME}.json"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lines = json.dumps(_rounded(document), separators=(",", ":")).replace('},{"', '},\n{"')
-        write_whole(path, (lines + "\n").encode())
+        text = json.dumps(rounded(document, _DIGITS), separators=(",", ":"))
+        write_file(path, text.replace('},{"', '},\n{"') + "\n")
 
     def _code_digest(self, table: Table) -> str:
         """Of the code that measures: results of other code are not taken for this one's."""
@@ -128,23 +121,41 @@ class Study:
                 digest.update(name.encode() + path.read_bytes())
         return digest.hexdigest()[:16]
 
-    def _measured(
-        self, table: Table, waiting: Sequence[tuple[str, Unit]]
-    ) -> Iterator[tuple[str, Result]]:
+    def _measured(self, table: Table, waiting: Mapping[str, Unit]) -> Iterator[tuple[str, Result]]:
         """Results as they come, in any order."""
         if self.workers == 1 or len(waiting) < 2:
-            for key, unit in waiting:
+            for key, unit in waiting.items():
                 yield key, _plain(table.measure(unit))
             return
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(self.workers, mp_context=context) as pool:
-            running = {pool.submit(table.measure, unit): (key, unit) for key, unit in waiting}
+            running = {pool.submit(table.measure, unit): key for key, unit in waiting.items()}
             try:
                 for future in as_completed(running):
-                    key, unit = running[future]
-                    yield key, _plain(_result_of(future, table, unit))
+                    key = running[future]
+                    try:
+                        yield key, _plain(future.result())
+                    except ScanweldError:
+                        raise
+                    except Exception as error:
+                        raise RuntimeError(
+                            f"{table.NAME}: {dict(waiting[key])}: {error}"
+                        ) from error
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
+
+
+def measured(table: Table, study: Study) -> list[Record]:
+    """The records of a table, measured where they are not yet; shows how far it is."""
+    columns = (
+        TextColumn("{task.description}"),
+        *(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task(table.NAME, total=None)
+        return study.records(
+            table, lambda done, total: progress.update(task, completed=done, total=total)
+        )
 
 
 def read_records(out: Path, name: str) -> list[Record]:
@@ -171,15 +182,6 @@ def measured_by(command: str) -> Iterator[None]:
         yield
     except FileNotFoundError as error:
         raise InputError(f"{error.filename}: is missing; measure it first ({command})") from error
-
-
-def _result_of(future: "Future[Result]", table: Table, unit: Unit) -> Result:
-    error = future.exception()
-    if isinstance(error, ScanweldError):
-        raise error
-    if error is not None:
-        raise RuntimeError(f"{table.NAME}: {dict(unit)}: {error}") from error
-    return future.result()
 
 
 def _key(code: str, table: Table, unit: Unit) -> str:
@@ -217,15 +219,4 @@ def _is_cut_short(file: BinaryIO) -> bool:
 
 def _plain(result: Result) -> Result:
     """As JSON will give it back, so that fresh and stored results do not differ."""
-    return json.loads(json.dumps(_rounded(result)))
-
-
-def _rounded(value: Any) -> Any:
-    """Floats to a few significant digits, at any depth."""
-    if isinstance(value, float):
-        return float(f"{value:.{_DIGITS}g}")
-    if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_rounded(item) for item in value]
-    return value
+    return json.loads(json.dumps(rounded(result, _DIGITS)))

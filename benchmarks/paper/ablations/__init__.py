@@ -2,6 +2,7 @@
 
 from benchmarks.paper.ablations import search
 from benchmarks.paper.ablations.parts import PARTS
+from benchmarks.paper.real import real_pair
 from benchmarks.paper.views import MADE, pair_units, virtual_pair
 from benchmarks.study.study import Result, Unit
 
@@ -30,7 +31,7 @@ def units(quick: bool) -> list[Unit]:
 def measure(unit: Unit) -> Result:
     """Measure one unit of its part."""
     if "i" in unit:
-        return search.measure_real(unit)
+        return search.measure(real_pair(unit["object"], (), unit["i"], unit["j"]), unit)
     noise = unit.get("noise", 0.0)
     pair = virtual_pair(unit["object"], unit["azimuth"], unit["gap"], noise)
     return PARTS[unit["part"]].measure(pair, unit)

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from benchmarks.paper.ablations.search import measure as measure_search
 from benchmarks.paper.baselines.feature_views import is_seen
 from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined
-from benchmarks.paper.views import VirtualPair, overlap_of
+from benchmarks.paper.views import KnownPair, overlap_of
 from benchmarks.study.study import Result, Unit
 from scanweld.config import ContoursConfig, HeatConfig, RefineConfig
 from scanweld.contours.coherence import contour_pair
@@ -82,9 +82,9 @@ COARSE: Changes = {
 }
 
 
-def measure_contours(pair: VirtualPair, unit: Unit) -> Result:
+def measure_contours(pair: KnownPair, unit: Unit) -> Result:
     """Errors of each variant from each start, and how far contours lie apart at the truth."""
-    scans = pair.i.scan, pair.j.scan
+    scans = pair.i, pair.j
     starts = [pair.start(degrees, unit["azimuth"]) for degrees in unit["starts"]]
     return {
         "errors": {
@@ -99,9 +99,9 @@ def measure_contours(pair: VirtualPair, unit: Unit) -> Result:
     }
 
 
-def contours_apart(pair: VirtualPair, config: ContoursConfig) -> list[float]:
+def contours_apart(pair: KnownPair, config: ContoursConfig) -> list[float]:
     """Percentiles of the distance in pixels from predicted to observed contours, at the truth."""
-    i, j = (observe_contours(view.scan, config) for view in (pair.i, pair.j))
+    i, j = (observe_contours(scan, config) for scan in (pair.i, pair.j))
     pairs = (
         contour_pair(i, j, pair.true.inverse(), config),
         contour_pair(j, i, pair.true, config),
@@ -116,9 +116,9 @@ def contours_apart(pair: VirtualPair, config: ContoursConfig) -> list[float]:
     return np.percentile(np.concatenate(distances), PERCENTILES).tolist()
 
 
-def measure_terms(pair: VirtualPair, unit: Unit) -> Result:
+def measure_terms(pair: KnownPair, unit: Unit) -> Result:
     """Errors with contours alone, surfaces alone and both, from a pose that is nearly right."""
-    scans, start = (pair.i.scan, pair.j.scan), pair.start(TERMS_START_DEG, unit["azimuth"])
+    scans, start = (pair.i, pair.j), pair.start(TERMS_START_DEG, unit["azimuth"])
     found = {ALONE: aligned("mm-icc", scans, start, residual="normal").poses}
     found |= {name: jointly_refined(scans, start, **change) for name, change in TERMS.items()}
     return {
@@ -127,11 +127,11 @@ def measure_terms(pair: VirtualPair, unit: Unit) -> Result:
     }
 
 
-def measure_heat(pair: VirtualPair, unit: Unit) -> Result:
+def measure_heat(pair: KnownPair, unit: Unit) -> Result:
     """Repeatability and precision by what heat spreads on; each as (right, asked, by chance)."""
     result = {}
     for name, change in HEAT.items():
-        found = [describe(view.scan, HeatConfig(**change)) for view in (pair.i, pair.j)]
+        found = [describe(scan, HeatConfig(**change)) for scan in (pair.i, pair.j)]
         result[name] = {
             "keypoints": [len(features) for features in found],
             "repeated": repeated(pair, found),
@@ -140,24 +140,27 @@ def measure_heat(pair: VirtualPair, unit: Unit) -> Result:
     return result
 
 
-def repeated(pair: VirtualPair, found: Sequence[Features]) -> list[float]:
+def repeated(pair: KnownPair, found: Sequence[Features]) -> list[float]:
     """Keypoints that the other view sees, and has; by chance, evenly spread samples do."""
-    reach = REPEATED_DIAMETERS * pair.i.diameter
+    reach = REPEATED_DIAMETERS * pair.diameter
     totals = np.zeros(3)
-    ways = ((pair.i, pair.j, *found), (pair.j, pair.i, *found[::-1]))
-    for a, b, of_a, of_b in ways:
+    ways = (
+        (pair.i, pair.j, pair.true.inverse(), *found),
+        (pair.j, pair.i, pair.true, *found[::-1]),
+    )
+    for a, b, b_from_a, of_a, of_b in ways:
         if not len(of_b):
             continue
-        tree, b_from_a = KDTree(of_b.points), b.from_other(a)
-        keypoints, samples = b_from_a.apply(of_a.points), b_from_a.apply(a.scan.samples.points)
-        keypoints, samples = (x[is_seen(x, b.scan)] for x in (keypoints, samples))
+        tree = KDTree(of_b.points)
+        keypoints, samples = (b_from_a.apply(x) for x in (of_a.points, a.samples.points))
+        keypoints, samples = (x[is_seen(x, b)] for x in (keypoints, samples))
         near, by_chance = (tree.query(x)[0] < reach for x in (keypoints, samples))
         level = float(by_chance.mean()) if len(by_chance) else 0.0
         totals += near.sum(), len(near), len(near) * level
     return totals.tolist()
 
 
-def matched(pair: VirtualPair, found: Sequence[Features]) -> list[float]:
+def matched(pair: KnownPair, found: Sequence[Features]) -> list[float]:
     """Matches of eq. 1 with the median as threshold; by chance, any keypoint is as likely."""
     of_i, of_j = found
     matches = match_signatures(of_i.signatures, of_j.signatures)
@@ -165,22 +168,21 @@ def matched(pair: VirtualPair, found: Sequence[Features]) -> list[float]:
         return [0.0, 0.0, 0.0]
     in_i = pair.true.apply(of_j.points)
     apart = np.linalg.norm(of_i.points[matches.s][:, None] - in_i, axis=-1)
-    is_right = apart < RIGHT_DIAMETERS * pair.i.diameter
+    is_right = apart < RIGHT_DIAMETERS * pair.diameter
     right = is_right[np.arange(len(matches)), matches.t].sum()
     return [float(right), float(len(matches)), float(is_right.mean(axis=1).sum())]
 
 
-def measure_coarse(pair: VirtualPair, unit: Unit) -> Result:
+def measure_coarse(pair: KnownPair, unit: Unit) -> Result:
     """Errors of the coarse pose in each reading of the published step."""
-    i, j = pair.i.scan, pair.j.scan
-    features = [describe(scan, HeatConfig()) for scan in (i, j)]
+    features = [describe(scan, HeatConfig()) for scan in (pair.i, pair.j)]
     return {
-        name: pair.error(coarse_pose(i, j, features, **change).i_from_j)
+        name: pair.error(coarse_pose(pair.i, pair.j, features, **change).i_from_j)
         for name, change in COARSE.items()
     }
 
 
-def _error(pair: VirtualPair, poses: Mapping[int, Pose]) -> dict[str, float | None]:
+def _error(pair: KnownPair, poses: Mapping[int, Pose]) -> dict[str, float | None]:
     return pair.error(poses[0].inverse() @ poses[1])
 
 
@@ -197,7 +199,7 @@ class Part:
         quick: What else stands in its unit.
     """
 
-    measure: Callable[[VirtualPair, Unit], Result]
+    measure: Callable[[KnownPair, Unit], Result]
     gaps: Sequence[int]
     azimuths: Sequence[int]
     more: Mapping[str, Any] = field(default_factory=dict)

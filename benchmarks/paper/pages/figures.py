@@ -181,10 +181,10 @@ def _prunings(records: Records, out: Path) -> None:
     """Figures 2 and 3: what the three prunings take, in the image of camera j."""
     for number, record in enumerate(records, 2):
         pair, result = pair_of(record.unit), record.result
-        look = look_through(pair.j.scan, (WIDTH // 3, 660))
-        camera = pair.j.scan.image.camera
-        own = colored(pair.j.scan.mesh, CLAY)
-        predicted = moved(colored(pair.i.scan.mesh, SCANS[1]), pair.true.inverse())
+        look = look_through(pair.j, (WIDTH // 3, 660))
+        camera = pair.j.image.camera
+        own = colored(pair.j.mesh, CLAY)
+        predicted = moved(colored(pair.i.mesh, SCANS[1]), pair.true.inverse())
         row = []
         for mesh, sets, title, width in (
             (own, _OBSERVED, "observed by camera $j$", 3.0),
