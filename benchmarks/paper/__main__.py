@@ -30,12 +30,10 @@ from scanweld.work.threads import num_workers
 
 TABLES = ("table1", "table2", "real_pairs", "features", "ablations", "basins", "figures")
 """In the order in which they are measured and shown; each is a module of this folder."""
+_MODULES = ("views", "real", "heat_field", "settings", "methods", "{table}")
 MEASURING = (
     PACKAGE,
-    *(
-        f"benchmarks/paper/{name}.py"
-        for name in ("views", "real", "settings", "methods", "{table}")
-    ),
+    *(f"benchmarks/paper/{name}.py" for name in _MODULES),
     *(f"benchmarks/paper/{name}/*.py" for name in ("baselines", "{table}")),
 )
 USAGE_ERROR = 2

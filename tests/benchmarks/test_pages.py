@@ -1,7 +1,6 @@
 """Pages that benchmarks write say what their records say."""
 
 import importlib
-import json
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -13,9 +12,10 @@ from benchmarks.blocks import BLOCK
 from benchmarks.paper import method
 from benchmarks.paper.__main__ import TABLES
 from benchmarks.paper.pages import write_index, write_page
-from benchmarks.study.pages import grid
+from benchmarks.study.pages import grid, rendered
 from benchmarks.study.study import read_records
 from scanweld.errors import InputError
+from scanweld.evidence.evidence import MIN_AGREE
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -46,30 +46,26 @@ def test_every_measured_part_stands_somewhere(pages: ModuleType):
 
 
 def test_method_is_what_its_template_and_the_results_make():
-    numbers = method.method_numbers(PAPER)
-    stored = json.loads((PAPER / "data/method.json").read_text(encoding="utf-8"))
-    assert stored == json.loads(json.dumps(numbers)), "run python -m benchmarks.paper --pages"
     committed = (DOCS / "method.md").read_text(encoding="utf-8")
-    assert committed == method.method_text(stored), "run python -m benchmarks.paper --pages"
+    assert committed == method.method_text(PAPER), "run python -m benchmarks.paper --pages"
 
 
-def test_method_refuses_to_leave_a_number_out():
-    numbers = json.loads((PAPER / "data/method.json").read_text(encoding="utf-8"))
-    del numbers["sets"]["wrong"]
-    with pytest.raises(UndefinedError, match="wrong"):
-        method.method_text(numbers)
+def test_a_template_refuses_to_leave_a_number_out(tmp_path: Path):
+    (tmp_path / "page.md").write_text("{{=evidence.evidence.MIN_AGREE}} {{ told.number }}")
+    assert rendered(tmp_path / "page.md", {"told": {"number": 3}}) == f"{MIN_AGREE:g} 3"
+    with pytest.raises(UndefinedError, match="number"):
+        rendered(tmp_path / "page.md", {"told": {}})
 
 
 def test_a_missing_result_is_told_in_one_line(tmp_path: Path):
     with pytest.raises(InputError, match=r"^\S+: is missing; measure it first \(.*\)$"):
-        method.method_numbers(tmp_path, tmp_path)
+        method.method_text(tmp_path, tmp_path)
 
 
 # The page of the figures draws them, which takes too long here and needs the meshes.
 @pytest.mark.parametrize("name", [name for name in TABLES if name != "figures"])
 def test_pages_of_the_study_are_those_of_its_results(name: str, tmp_path: Path):
-    write_page(name, read_records(PAPER, name), tmp_path, quick=False)
-    made = (tmp_path / f"{name}.md").read_text(encoding="utf-8")
+    made = write_page(name, read_records(PAPER, name), tmp_path, quick=False)
     committed = (PAPER / f"{name}.md").read_text(encoding="utf-8")
     assert committed == made, "run python -m benchmarks.paper --pages"
 

@@ -2,33 +2,26 @@
 
 import sys
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from PIL import Image
-from scipy.ndimage import label
 from scipy.spatial import KDTree
 
 from benchmarks.paper import figures
 from benchmarks.paper.drawing import (
     PAPER,
-    SCANS,
-    Body,
     Panel,
     balls,
+    colored,
     draw_sheet,
-    faceted_body,
     heat_colors,
     look_at,
     render,
-    scan_body,
+    rgb,
 )
 from benchmarks.paper.heat_field import heat_field
 from benchmarks.paper.pages import write_page
-from benchmarks.paper.pages.figures import linked
 from benchmarks.paper.pages.placed import Placed
 from benchmarks.paper.views import virtual_scan
 from benchmarks.study.study import Record
@@ -36,28 +29,23 @@ from scanweld.config import ContoursConfig, HeatConfig
 from scanweld.contours.coherence import contour_pair
 from scanweld.contours.contour_sets import observe_contours
 from scanweld.errors import InputError
+from scanweld.geometry.mesh import TriangleMesh
 from scanweld.heat.features import describe
 
 BEFORE, ASIDE = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
 DOWN_IS_Y = (0.0, -1.0, 0.0)
-RED, BLUE = np.array([0.9, 0.1, 0.1]), np.array([0.1, 0.1, 0.9])
+RED, BLUE = "#E61A1A", "#1A1AE6"
 
 
-def square(depth: float, color: np.ndarray, half: float = 1.0) -> Body:
+def square(depth: float, color: str, half: float = 1.0) -> TriangleMesh:
     """A square across the z axis that looks towards -z."""
     corners = half * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
     faces = np.array([[0, 2, 1], [0, 3, 2]])
-    colors = np.broadcast_to(color, (2, 3))
-    return faceted_body(corners + np.array([0.0, 0.0, depth]), faces, colors)
-
-
-def page_of(record: Record, out: Path) -> str:
-    write_page("figures", [record], out, quick=True)
-    return (out / "figures.md").read_text(encoding="utf-8")
+    return colored(TriangleMesh(vertices=corners + np.array([0.0, 0.0, depth]), faces=faces), color)
 
 
 def is_paper(picture: np.ndarray) -> np.ndarray:
-    return (picture == np.rint(255 * PAPER)).all(axis=-1)
+    return (picture == rgb(PAPER)).all(axis=-1)
 
 
 def test_a_ball_is_a_disc_where_the_look_says_it_lies():
@@ -85,27 +73,6 @@ def test_the_inside_of_a_surface_is_greyer_and_darker():
     inside = render([body], look_at(body.vertices, (0, 0, 1.0), DOWN_IS_Y, (20, 20)))[10, 10]
     assert np.ptp(inside.astype(int)) < np.ptp(outside.astype(int))
     assert inside.max() < outside.max()
-
-
-@given(st.sets(st.tuples(st.integers(0, 7), st.integers(0, 7)), min_size=1))
-def test_links_join_exactly_what_touches(there: set[tuple[int, int]]):
-    pixels = np.array(sorted(there))
-    segments = linked(pixels)
-    assert (np.abs(segments[:, 0] - segments[:, 1]) <= 1).all()
-    assert {tuple(end) for end in segments.reshape(-1, 2).astype(int)} == there
-    image = np.zeros((8, 8), bool)
-    image[tuple(pixels.T)] = True
-    _, count = cast(tuple[np.ndarray, int], label(image, np.ones((3, 3))))
-    parent = {pixel: pixel for pixel in there}
-
-    def root(pixel: tuple[int, int]) -> tuple[int, int]:
-        while parent[pixel] != pixel:
-            pixel = parent[pixel]
-        return pixel
-
-    for start, end in segments.astype(int):
-        parent[root(tuple(start))] = root(tuple(end))
-    assert len({root(pixel) for pixel in there}) == count
 
 
 def test_heat_runs_from_cold_to_hot():
@@ -157,31 +124,17 @@ def test_pruned_contours_are_those_of_the_library(pruned: Record):
     assert pixels("observed_kept", "observed_second") == has(none.observed.pixels)
 
 
-def test_prunings_leave_what_coheres(pruned: Record):
-    coherence = pruned.result["coherence"]
-    assert coherence["none"] < coherence["1"]
-    assert coherence["none"] < coherence["1, 2 and 3"]
-
-
 def test_cuts_through_true_poses_lie_on_the_cut_through_the_object():
     views = [virtual_scan("creature", azimuth) for azimuth in (45.0, 105.0)]
     scene = Placed("creature", views, (60, 60), (1.0, 1.0))
     true = {k: views[0].from_other(view) for k, view in enumerate(views)}
-    on_object = KDTree(scene.object_cut().reshape(-1, 3))
-    for k, pose in scene.in_world(true).items():
-        cut = scene.scan_cut(k, pose).reshape(-1, 3)
+    on_object = KDTree(scene.cut(scene.mesh).reshape(-1, 3))
+    for view, mesh in zip(views, scene.in_world(true), strict=True):
+        cut = scene.cut(mesh).reshape(-1, 3)
         away, _ = on_object.query(cut)
         assert len(cut) > 20
-        assert np.median(away) < views[k].scan.image.pixel
+        assert np.median(away) < view.scan.image.pixel
         assert np.allclose(cut @ scene.up, scene.level)
-
-
-def test_a_scan_in_a_scene_has_its_colour():
-    view = virtual_scan("creature", 60.0)
-    body = scan_body(view.scan, SCANS[1])
-    picture = render([body], look_at(body.vertices, BEFORE, DOWN_IS_Y, (60, 60)))
-    mean = picture[~is_paper(picture)].mean(axis=0)
-    assert mean[2] > mean[1] > mean[0]
 
 
 def test_a_sheet_keeps_its_panels_to_the_pixel(tmp_path: Path):
@@ -200,26 +153,15 @@ def test_a_sheet_keeps_its_panels_to_the_pixel(tmp_path: Path):
 def test_the_page_shows_pictures_that_stand_and_numbers_of_the_records(
     pruned: Record, tmp_path: Path
 ):
-    text = page_of(pruned, tmp_path)
+    text = write_page("figures", [pruned], tmp_path, quick=True)
     (picture,) = tmp_path.glob("*.png")
     assert f"]({picture.name})" in text
     assert picture.stat().st_size <= 400_000
     for name in ("observed_second", "predicted_first", "predicted_third", "predicted_kept"):
         assert f"{len(pruned.result[name]):,}" in text
     before = picture.read_bytes()
-    page_of(pruned, tmp_path)
+    write_page("figures", [pruned], tmp_path, quick=True)
     assert picture.read_bytes() == before, "not the same bytes again"
-
-
-def test_a_gallery_says_how_many_runs_are_right(tmp_path: Path):
-    unit = next(unit for unit in figures.units(quick=True) if unit["figure"] == "gallery")
-    record = Record(unit=unit, result=figures.measure(unit))
-    for method in ("m-icc", "mm-icc"):
-        result = record.result[method]
-        assert (result["converged"] == 1) == (
-            result["rotation_deg"] < 2 and result["translation_percent"] < 1
-        )
-    assert "fig6a-gallery-creature.png" in page_of(record, tmp_path)
 
 
 def test_without_matplotlib_the_page_names_the_remedy(
@@ -227,7 +169,7 @@ def test_without_matplotlib_the_page_names_the_remedy(
 ):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(InputError, match=r"matplotlib.*pip install 'scanweld\[bench\]'"):
-        page_of(pruned, tmp_path)
+        write_page("figures", [pruned], tmp_path, quick=True)
 
 
 def test_a_missing_scan_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

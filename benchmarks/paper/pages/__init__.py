@@ -13,8 +13,8 @@ from scanweld.io.atomic import write_whole
 FOLDER = Path(__file__).parent
 
 
-def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) -> None:
-    """Write the page of a table of the study, and the pictures on it.
+def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) -> str:
+    """Write the page of a table of the study, and the pictures on it; what it says.
 
     The template sees ``records`` and all names of the settings, of the module that measures the
     table, and of the one that tells of it, whose ``draw(records, out)`` draws the pictures.
@@ -32,6 +32,7 @@ def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) 
     values = vars(settings) | vars(measuring) | vars(telling) | told
     text = rendered(FOLDER / f"{name}.md", values).rstrip() + "\n"
     write_whole(out / f"{name}.md", text.encode())
+    return text
 
 
 def write_index(names: Sequence[str], out: Path) -> None:
