@@ -61,11 +61,7 @@ def main() -> int:
 
 
 def table(name: str) -> Table:
-    """The table or figure of this name.
-
-    Raises:
-        InputError: If there is none; the message names those that are.
-    """
+    """The table or figure of this name."""
     if name not in TABLES:
         raise InputError(f"{name}: no such table; there are {', '.join(TABLES)}")
     return import_module(f"benchmarks.paper.{name}")  # type: ignore[return-value]  # a module

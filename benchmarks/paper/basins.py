@@ -19,11 +19,7 @@ QUICK_METHODS = ("icp", "trimmed-icp", "m-icc", "mm-icc")
 
 
 def units(quick: bool) -> list[Unit]:
-    """One unit a pair of views; every azimuth has a random axis of its own.
-
-    Raises:
-        InputError: If a mesh or a library is missing.
-    """
+    """One unit a pair of views; every azimuth has a random axis of its own."""
     if quick:
         starts = {"starts": [5, 20, 40], "methods": QUICK_METHODS}
         return [{"object": MADE, "gap": 60, "azimuth": a, **starts} for a in (0, 135)]

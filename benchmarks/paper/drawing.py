@@ -184,11 +184,7 @@ class Panel:
 
 
 def draw_sheet(rows: Sequence[Sequence[Panel]], path: Path, *, letters: bool = True) -> None:
-    """Lay rows of panels out on a sheet, pixel on pixel, and write it as a small PNG.
-
-    Raises:
-        InputError: If matplotlib is not installed.
-    """
+    """Lay rows of panels out on a sheet, pixel on pixel, and write it as a small PNG."""
     need("matplotlib")
     figures, agg = need("matplotlib.figure"), need("matplotlib.backends.backend_agg")
     collections = need("matplotlib.collections")

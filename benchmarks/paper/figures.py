@@ -97,11 +97,7 @@ def measure(unit: Unit) -> Result:
 
 
 def subject(name: str, azimuth_deg: float | None) -> PreparedScan:
-    """A virtual scan of an object from an azimuth, or without one a real scan of the bunny.
-
-    Raises:
-        InputError: If the file of the scan is missing.
-    """
+    """A virtual scan of an object from an azimuth, or without one a real scan of the bunny."""
     if azimuth_deg is not None:
         return virtual_scan(name, azimuth_deg).scan
     return prepare(read_scan(data_file(f"stanford-bunny/{name}.ply")), PrepareConfig())

@@ -42,22 +42,12 @@ FAR_ICP, NEAR_ICP, *_ = schedules(1.0)
 
 
 def write_method(folder: Path) -> None:
-    """Write method.md beside the folder of the study's pages.
-
-    Raises:
-        InputError: If a result is missing.
-    """
+    """Write method.md beside the folder of the study's pages."""
     write_whole(folder.parent / "method.md", method_text(folder).encode())
 
 
 def method_text(folder: Path, others: Path = OTHERS) -> str:
-    """The page, of the study in a folder and the records of the other benchmarks in another.
-
-    Raises:
-        InputError: If a result is missing.
-        ValueError: If the template names a constant that is not there.
-        jinja2.UndefinedError: If it names a number that is not there.
-    """
+    """The page, of the study in a folder and the records of the other benchmarks in another."""
     names = vars(settings) | vars(basins) | vars(table1) | vars(ablations) | globals()
     records = {"study": partial(study, folder), "other": partial(other, others)}
     return rendered(TEMPLATE, names | records)

@@ -96,11 +96,7 @@ def missing_modules() -> set[str]:
 
 
 def need_all(names: Iterable[str]) -> None:
-    """See to it that all methods of these names can run.
-
-    Raises:
-        InputError: If a module of the extra ``bench`` is missing or cannot be loaded.
-    """
+    """See to it that all methods of these names can run."""
     for name in names:
         for module in METHODS[name].needs:
             need(module)

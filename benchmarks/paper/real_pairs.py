@@ -23,11 +23,7 @@ CPD_STEP = 12
 
 
 def units(quick: bool) -> list[Unit]:
-    """All pairs of the bunny, and those of the dragon that are not too far apart.
-
-    Raises:
-        InputError: If the scans or a library are missing.
-    """
+    """All pairs of the bunny, and those of the dragon that are not too far apart."""
     if quick:
         return [{"object": MADE, "i": 0, "j": gap, "cpd": False} for gap in QUICK_GAPS]
     need_all(METHODS)

@@ -43,11 +43,7 @@ RIGHT_MATCH = 0.05
 
 
 def units(quick: bool) -> list[Unit]:
-    """Pairs of views of the study's objects, or a few of the creature.
-
-    Raises:
-        InputError: If a mesh or a library is missing.
-    """
+    """Pairs of views of the study's objects, or a few of the creature."""
     cases = product((MADE,), (0.0,), PROTOCOLS, (0,), QUICK_GAPS)
     if not quick:
         need_all(METHODS)

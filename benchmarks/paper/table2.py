@@ -40,11 +40,7 @@ NUM_DEFAULT_DRAWS = 3
 
 
 def units(quick: bool) -> list[Unit]:
-    """The sweep of the tuning, and all methods with the tuning that it found.
-
-    Raises:
-        InputError: If a mesh is missing.
-    """
+    """The sweep of the tuning, and all methods with the tuning that it found."""
     if quick:
         return [_final(QUICK, 0.0, method, [(deg, 1) for deg, _ in STARTS]) for method in METHODS]
     for setting in NUMERALS:

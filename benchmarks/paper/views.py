@@ -105,20 +105,12 @@ def data_file(relative: str) -> Path:
 
 @lru_cache
 def mesh_of(name: str) -> TriangleMesh:
-    """The complete surface of one of the study's objects.
-
-    Raises:
-        InputError: If its file is missing.
-    """
+    """The complete surface of one of the study's objects."""
     return creature() if name == MADE else read_mesh(data_file(f"meshes/{name}.ply"))
 
 
 def pair_units(gaps: Iterable[int], azimuths: Iterable[int], **more: Any) -> list[Unit]:
-    """Units of all pairs of views of the study's objects.
-
-    Raises:
-        InputError: If a mesh is missing.
-    """
+    """Units of all pairs of views of the study's objects."""
     for name in OBJECTS:
         mesh_of(name)
     return [

@@ -14,6 +14,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, TypeVar
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined
 
 from benchmarks.study.records import (
@@ -76,7 +77,8 @@ def percent(share: float, digits: int = 0) -> str:
 _JINJA = Environment(
     undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
 )
-_JINJA.filters["percent"] = percent
+_JINJA.filters |= {"percent": percent}
+_JINJA.filters |= {"mean": lambda x: np.mean(list(x)), "median": lambda x: np.median(list(x))}
 _HELPERS = (grid, answers, beyond, grouped, of, overlap_title, overlapping, up_to, values_of)
 _JINJA.globals |= {function.__name__: function for function in _HELPERS}
 

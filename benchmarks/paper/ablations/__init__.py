@@ -10,14 +10,10 @@ NAME = "ablations"
 
 
 def units(quick: bool) -> list[Unit]:
-    """Pairs of views for each part, and the thin ones among the real pairs for the search.
-
-    Raises:
-        InputError: If a mesh or the real scans are missing.
-    """
+    """Pairs of views for each part, and the thin ones among the real pairs for the search."""
     if quick:
         return [
-            {"part": name, "object": MADE, "gap": part.quick_gap, "azimuth": 0, **part.quick}
+            {"part": name, "object": MADE, "gap": part.quick_gap, "azimuth": 0, **part.more}
             for name, part in PARTS.items()
         ]
     units = [

@@ -186,49 +186,23 @@ def _error(pair: KnownPair, poses: Mapping[int, Pose]) -> dict[str, float | None
     return pair.error(poses[0].inverse() @ poses[1])
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Part:
-    """One ablation.
-
-    Attributes:
-        measure: Of a pair of views and its unit.
-        gaps: Between the views, in degrees.
-        azimuths: Of the first view.
-        more: What else stands in its units.
-        quick_gap: The gap of the one pair of a quick run.
-        quick: What else stands in its unit.
-    """
+    """One ablation: how it measures a pair, which gaps and azimuths, what else its units hold."""
 
     measure: Callable[[KnownPair, Unit], Result]
     gaps: Sequence[int]
     azimuths: Sequence[int]
     more: Mapping[str, Any] = field(default_factory=dict)
     quick_gap: int = 30
-    quick: Mapping[str, Any] = field(default_factory=dict)
 
 
 QUARTERS, EIGHTHS = range(0, 360, 90), range(0, 360, 45)
 PARTS = {
-    "contours": Part(
-        measure=measure_contours,
-        gaps=(30, 60, 90),
-        azimuths=QUARTERS,
-        more={"starts": (20, 40)},
-        quick_gap=60,
-        quick={"starts": [20]},
-    ),
-    "terms": Part(
-        measure=measure_terms,
-        gaps=(60, 90, 110, 120),
-        azimuths=EIGHTHS,
-        more={"noise": TERMS_NOISE},
-        quick_gap=90,
-        quick={"noise": TERMS_NOISE},
-    ),
-    "heat": Part(measure=measure_heat, gaps=(30, 60, 90), azimuths=QUARTERS),
-    "coarse": Part(measure=measure_coarse, gaps=(10, 30, 50, 70, 90), azimuths=QUARTERS),
-    "search": Part(
-        measure=measure_search, gaps=(90, 100, 110, 120), azimuths=EIGHTHS, quick_gap=90
-    ),
+    "contours": Part(measure_contours, (30, 60, 90), QUARTERS, {"starts": (20, 40)}, 60),
+    "terms": Part(measure_terms, (60, 90, 110, 120), EIGHTHS, {"noise": TERMS_NOISE}, 90),
+    "heat": Part(measure_heat, (30, 60, 90), QUARTERS),
+    "coarse": Part(measure_coarse, (10, 30, 50, 70, 90), QUARTERS),
+    "search": Part(measure_search, (90, 100, 110, 120), EIGHTHS, quick_gap=90),
 }
 """In the order in which they are measured and shown."""

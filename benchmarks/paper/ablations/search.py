@@ -39,11 +39,7 @@ WEIGHTS = {
 
 
 def thin_real_pairs() -> list[Unit]:
-    """The pairs of real scans that overlap little.
-
-    Raises:
-        InputError: If the scans are missing.
-    """
+    """The pairs of real scans that overlap little."""
     return [
         {"object": folder, **{key: row[key] for key in ("i", "j", "overlap")}}
         for folder in REAL

@@ -90,11 +90,7 @@ def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
 def distances(
     descriptor: str, views: Sequence[FeatureView], points: Sequence[FloatArray]
 ) -> FloatArray:
-    """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another.
-
-    Raises:
-        InputError: If the library that computes the descriptor is missing.
-    """
+    """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another."""
     described = _DESCRIBE[descriptor]
     one, other = (described(view, at) for view, at in zip(views, points, strict=True))
     apart = wave_distances if descriptor == "WKS" else cdist

@@ -12,13 +12,7 @@ from scanweld.geometry.prepared import PreparedScan
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class ScanPair:
-    """Two scans to be registered: j is moved onto i.
-
-    Attributes:
-        i: The scan that stays.
-        j: The scan that is moved.
-        diameter: Of the scans or of their object, in the scans' unit.
-    """
+    """Two scans, j to be moved onto i, and the diameter of them or of their object."""
 
     i: PreparedScan
     j: PreparedScan
@@ -58,16 +52,11 @@ def closeness(distance: float, diameter: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class CloudPair:
-    """Both scans as points about their middles, in diameters.
+    """Points (N, 3) of both scans about their middles (3,), in diameters, axes of the sensors.
 
     Libraries have their settings in metres, for streets and rooms, and step about the origin of
     what they are given. With the objects in the middle and one unit long the settings are shares
     of the diameter, and no method pays for where the sensor stood.
-
-    Attributes:
-        points: (N, 3) of i and of j, axes of the sensor frames.
-        middles: (3,) of both, in the sensor frames and in the scans' unit.
-        diameter: Of the pair.
     """
 
     points: tuple[FloatArray, FloatArray]

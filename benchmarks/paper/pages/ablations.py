@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.paper.ablations import parts
-from benchmarks.paper.ablations.search import RIGHT, rescored
-from benchmarks.paper.settings import CONVERGED
+from benchmarks.paper.ablations.search import RIGHT
 from benchmarks.study.pages import percent
 from benchmarks.study.records import Answer, Records, grouped, of, values_of
 from scanweld.geometry.arrays import FloatArray
@@ -28,11 +27,6 @@ def gaps_and_all(records: Records) -> dict[str, Records]:
 def contour_errors(records: Records, variant: str) -> list[Answer]:
     """Errors of a variant of MM-ICC from all starts."""
     return [error for record in records for error in record.result["errors"][variant]]
-
-
-def contours_right(records: Records, variant: str) -> str:
-    """Share of the runs of a variant of MM-ICC that come right."""
-    return percent(CONVERGED.share(contour_errors(records, variant)))
 
 
 def apart(records: Records, prunings: str) -> list[str]:
@@ -60,12 +54,8 @@ def term_cell(records: Records, name: str) -> str:
 
 def with_overlap(records: Records) -> dict[str, Records]:
     """The pairs by their gap, with the median overlap in the titles."""
-    overlap = {
-        gap: np.median([r.result["overlap"] for r in pairs])
-        for gap, pairs in grouped(records, "gap").items()
-    }
     return {
-        f"{gap}° (overlap {overlap[gap]:.2f})": pairs
+        f"{gap}° (overlap {np.median([r.result['overlap'] for r in pairs]):.2f})": pairs
         for gap, pairs in grouped(records, "gap").items()
     }
 
@@ -114,23 +104,9 @@ def by_kind(records: Records) -> dict[str, Records]:
 def first_right(records: Records, anchors: str) -> str:
     """How often the first answer is right with some of the anchors."""
     kept = [record.result[anchors][:1] for record in records]
-    return _share([any(map(RIGHT.holds, each)) for each in kept])
+    return fraction([any(map(RIGHT.holds, each)) for each in kept])
 
 
-def mean_anchors(records: Records) -> float:
-    """Mean number of keypoints of a scan."""
-    return float(np.mean([record.result["anchors"] for record in records]))
-
-
-def first_by(records: Records, score: str) -> str:
-    """How often the best pose by a score is right."""
-    return _share(rescored(records, score)[0])
-
-
-def auc_of(records: Records, score: str) -> str:
-    """AUC of a score over all poses that were kept."""
-    return f"{rescored(records, score)[1]:.3f}"
-
-
-def _share(is_right: Sequence[bool]) -> str:
+def fraction(is_right: Sequence[bool]) -> str:
+    """How many of all are right."""
     return f"{sum(is_right)}/{len(is_right)}"

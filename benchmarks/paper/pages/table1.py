@@ -168,12 +168,6 @@ def method_cell(records: Records, method: str) -> str:
     return LIMIT_OF[method].cell(answers(records, method), BASIN)
 
 
-def seconds(records: Records, method: str) -> str:
-    """Median CPU time of a pair."""
-    told = [each["seconds"] for each in answers(records, method)]
-    return f"{np.median(told):.2f}" if told else ""
-
-
 def noise_title(noise: float) -> str:
     """Standard deviation of the depth in words."""
     return f"noise {100 * noise:g} %" if noise else "no noise"
