@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.paper import ablations, basins, table2
-from benchmarks.paper.ablations.parts import PRUNED, contours_apart, matched, repeated
+from benchmarks.paper.ablations.parts import matched, repeated
 from benchmarks.paper.ablations.search import rescored
 from benchmarks.paper.pages import write_page
 from benchmarks.paper.settings import (
@@ -26,9 +25,9 @@ from benchmarks.paper.settings import (
     start_poses,
     true_poses,
 )
-from benchmarks.paper.views import VirtualScan, known_pair, virtual_pair, virtual_scan
+from benchmarks.paper.views import VirtualScan, known_pair, virtual_scan
 from benchmarks.study.study import Record, Unit
-from scanweld.config import ContoursConfig, HeatConfig
+from scanweld.config import HeatConfig
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.heat.features import describe
 
@@ -194,12 +193,6 @@ def test_keypoints_of_the_same_view_repeat_and_match_themselves():
     assert 0 < by_chance < asked
 
 
-def test_prunings_bring_the_contours_together():
-    pair = virtual_pair("creature", 0, 60)
-    apart = {name: contours_apart(pair, ContoursConfig(**p)) for name, p in PRUNED.items()}
-    assert apart["1, 2 and 3"][-1] <= apart["1 and 2"][-1] < apart["none"][-1]
-
-
 def test_basins_count_the_default_alike_from_every_start(tmp_path: Path):
     right, wrong = {"deg": 0.1, "percent": 0.1}, {"deg": 30.0, "percent": 10.0}
     answers = {"5": {"icp": right, "joint": right}, "40": {"icp": wrong, "joint": wrong}}
@@ -212,11 +205,3 @@ def test_basins_count_the_default_alike_from_every_start(tmp_path: Path):
     assert "| ICP | 2/2 0.10 | 1/2 0.10 |" in text
     assert "| default | 1/2 0.10 | 1/2 0.10 |" in text
     assert (tmp_path / "basins.png").stat().st_size > 0
-
-
-@pytest.mark.parametrize("module", [table2, ablations, basins])
-def test_quick_units_are_few_and_need_no_data(module: Any, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("SCANWELD_DATA", "/nowhere")
-    told = [str(unit) for unit in module.units(True)]
-    assert 0 < len(told) <= 8
-    assert not any(name in unit for unit in told for name in ("armadillo", "bunny", "dragon"))
