@@ -65,15 +65,8 @@ def try_methods(
 ) -> dict[str, dict[str, Any]]:
     """Run methods on a pair, one after the other, but for those whose library is not there.
 
-    Args:
-        names: Of the methods.
-        pair: The scans.
-        start: Pose i_from_j of those methods that start at one.
-        seed: Of those methods that draw random numbers.
-
-    Returns:
-        By name: "deg" and "percent" of the error, the method's "score", whether it "accepted" its
-        pose, where it says so, and its CPU "seconds".
+    By name: "deg" and "percent" of the error, the method's "score", whether it "accepted" its pose,
+    where it says so, and its CPU "seconds". The start is an i_from_j for the methods that take one.
     """
     tried: dict[str, dict[str, Any]] = {}
     missing = missing_modules()

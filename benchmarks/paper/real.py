@@ -33,14 +33,10 @@ def overlaps_of(folder: str) -> list[dict[str, Any]]:
 
 
 def real_pair(folder: str, names: tuple[str, ...], i: str, j: str) -> KnownPair:
-    """Two scans of an object.
+    """Two scans of an object by their names.
 
-    Args:
-        folder: Of the object.
-        names: Scans that a random motion and quarter turns of the grid are to disguise; without any
-            all scans stay in the frames of their files.
-        i: The name of one,
-        j: and of the other one.
+    With ``names`` these scans are disguised by random motions and quarter turns of their grids;
+    without any, all scans stay in the frames of their files.
     """
     _, world_from_scan, diameter = _scans(folder, names)
     a, b = (_prepared(folder, names, name) for name in (i, j))

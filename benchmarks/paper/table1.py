@@ -4,8 +4,8 @@ import zlib
 from itertools import product
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
+from benchmarks.paper.baselines.own import right_matches
 from benchmarks.paper.methods import METHODS, need_all, try_methods
 from benchmarks.paper.views import (
     MADE,
@@ -20,7 +20,6 @@ from benchmarks.study.study import Result, Unit
 from scanweld.config import CoarseConfig, HeatConfig
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import describe
-from scanweld.published.signature_matching import match_signatures
 
 NAME = "table1"
 
@@ -98,24 +97,14 @@ def _pair(unit: Unit, seed: int) -> KnownPair:
 
 
 def _matches(pair: KnownPair) -> dict[str, float | int]:
-    """What eq. 1 matches: keypoints of i, matches, right ones, and as many as chance would give.
-
-    Chance is a match of each of these keypoints of i with any keypoint of j.
-    """
+    """What eq. 1 matches: keypoints of i, matches, right ones, and as many as chance would give."""
     of_i, of_j = (describe(scan, HeatConfig()) for scan in (pair.i, pair.j))
     config = CoarseConfig()
-    matches = match_signatures(
-        of_i.signatures,
-        of_j.signatures,
+    right, matched, by_chance = right_matches(
+        *(pair.true, of_i, of_j, RIGHT_MATCH * pair.diameter),
         max_distance=config.max_signature_distance,
         quantile=config.signature_quantile,
         mutual=config.mutual,
     )
-    apart = cdist(of_i.points[matches.s], pair.true.apply(of_j.points))
-    is_near = apart < RIGHT_MATCH * pair.diameter
-    return {
-        "keypoints": len(of_i),
-        "matched": len(matches),
-        "right": int(is_near[np.arange(len(matches)), matches.t].sum()),
-        "by_chance": float(is_near.mean(axis=1).sum()),
-    }
+    counts = {"keypoints": len(of_i), "matched": int(matched), "right": int(right)}
+    return {**counts, "by_chance": by_chance}

@@ -123,15 +123,7 @@ def pair_units(gaps: Iterable[int], azimuths: Iterable[int], **more: Any) -> lis
 def virtual_scan(
     name: str, azimuth_deg: float, *, roll_deg: float = 0.0, noise: float = 0.0, seed: int = 0
 ) -> VirtualScan:
-    """Scan one of the study's objects from the side.
-
-    Args:
-        name: Of the object.
-        azimuth_deg: Of the camera.
-        roll_deg: Turn of the camera about its viewing axis.
-        noise: Standard deviation of the depth, in diameters.
-        seed: Of the noise.
-    """
+    """Scan an object from the side, with depth noise of a standard deviation in diameters."""
     mesh, view = mesh_of(name), camera_view(name, azimuth_deg, roll_deg)
     model, title = NoiseModel(depth_diameters=noise), f"{azimuth_deg:g}"
     scan = scan_mesh(mesh, view.camera, view.world_from_sensor, model, seed, name=title)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.paper.ablations.parts import matched, repeated
+from benchmarks.paper.ablations.parts import repeated
 from benchmarks.paper.ablations.search import rescored
+from benchmarks.paper.baselines.own import right_matches
 from benchmarks.paper.pages import write_page
 from benchmarks.paper.settings import (
     NUMERALS,
@@ -188,7 +189,7 @@ def test_keypoints_of_the_same_view_repeat_and_match_themselves():
     right, asked, by_chance = repeated(known_pair(view, view), (found, found))
     assert asked == 2 * len(found) > 0
     assert right == asked > by_chance > 0
-    right, asked, by_chance = matched(known_pair(view, view), (found, found))
+    right, asked, by_chance = right_matches(Pose.identity(), found, found, 0.06 * view.diameter)
     assert right == asked == len(found)
     assert 0 < by_chance < asked
 

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from benchmarks.paper.ablations.search import measure as measure_search
 from benchmarks.paper.baselines.feature_views import is_seen
-from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined
+from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined, right_matches
 from benchmarks.paper.views import KnownPair, overlap_of
 from benchmarks.study.study import Result, Unit
 from scanweld.config import ContoursConfig, HeatConfig, RefineConfig
@@ -17,7 +17,6 @@ from scanweld.contours.coherence import contour_pair
 from scanweld.contours.contour_sets import observe_contours
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features, describe
-from scanweld.published.signature_matching import match_signatures
 
 Changes = Mapping[str, Mapping[str, Any]]
 """Variants by name, each with the settings that it changes."""
@@ -131,11 +130,11 @@ def measure_heat(pair: KnownPair, unit: Unit) -> Result:
     """Repeatability and precision by what heat spreads on; each as (right, asked, by chance)."""
     result = {}
     for name, change in HEAT.items():
-        found = [describe(scan, HeatConfig(**change)) for scan in (pair.i, pair.j)]
+        of_i, of_j = (describe(scan, HeatConfig(**change)) for scan in (pair.i, pair.j))
         result[name] = {
-            "keypoints": [len(features) for features in found],
-            "repeated": repeated(pair, found),
-            "matched": matched(pair, found),
+            "keypoints": [len(of_i), len(of_j)],
+            "repeated": repeated(pair, (of_i, of_j)),
+            "matched": right_matches(pair.true, of_i, of_j, RIGHT_DIAMETERS * pair.diameter),
         }
     return result
 
@@ -158,19 +157,6 @@ def repeated(pair: KnownPair, found: Sequence[Features]) -> list[float]:
         level = float(by_chance.mean()) if len(by_chance) else 0.0
         totals += near.sum(), len(near), len(near) * level
     return totals.tolist()
-
-
-def matched(pair: KnownPair, found: Sequence[Features]) -> list[float]:
-    """Matches of eq. 1 with the median as threshold; by chance, any keypoint is as likely."""
-    of_i, of_j = found
-    matches = match_signatures(of_i.signatures, of_j.signatures)
-    if not len(matches):
-        return [0.0, 0.0, 0.0]
-    in_i = pair.true.apply(of_j.points)
-    apart = np.linalg.norm(of_i.points[matches.s][:, None] - in_i, axis=-1)
-    is_right = apart < RIGHT_DIAMETERS * pair.diameter
-    right = is_right[np.arange(len(matches)), matches.t].sum()
-    return [float(right), float(len(matches)), float(is_right.mean(axis=1).sum())]
 
 
 def measure_coarse(pair: KnownPair, unit: Unit) -> Result:

@@ -3,6 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from scipy.spatial.distance import cdist
+
 from benchmarks.paper.baselines.records import Answer, ScanPair, closeness
 from scanweld.config import CoarseConfig, Config, ContoursConfig, RefineConfig
 from scanweld.contours.coherence import contour_matcher
@@ -18,6 +21,7 @@ from scanweld.published.m_icc import m_icc as align_by_m_icc
 from scanweld.published.mm_icc import mm_icc as align_by_mm_icc
 from scanweld.published.outer_loop import ContourAlignment
 from scanweld.published.point_icp import point_icp
+from scanweld.published.signature_matching import match_signatures
 from scanweld.refinement.refine import refine_poses
 
 Scans = Sequence[PreparedScan]
@@ -49,6 +53,21 @@ def coarse_pose(
     """Matched PA-HKS keypoints and ICP (paper 3.1), under another reading of them."""
     of_i, of_j = features or [describe(scan, Config().heat) for scan in (i, j)]
     return register_as_published(i, j, of_i, of_j, CoarseConfig(**settings))
+
+
+def right_matches(
+    i_from_j: Pose, of_i: Features, of_j: Features, reach: float, **settings: Any
+) -> list[float]:
+    """How many matches of eq. 1 are right, how many there are, and how many are right by chance.
+
+    By chance a keypoint of i that has a match has any keypoint of j.
+    """
+    matches = match_signatures(of_i.signatures, of_j.signatures, **settings)
+    apart = cdist(of_i.points[matches.s], i_from_j.apply(of_j.points))
+    is_near = apart < reach
+    right = is_near[np.arange(len(matches)), matches.t].sum()
+    by_chance = is_near.mean(axis=1).sum() if len(matches) else 0.0
+    return [float(right), float(len(matches)), float(by_chance)]
 
 
 def searched(pair: ScanPair, config: Config) -> PairResult:

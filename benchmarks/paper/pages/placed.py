@@ -33,12 +33,8 @@ _TRUTH, _TRUTH_WIDTH, _CUT_WIDTH = "#D2D3D3", 7.0, 2.4
 class Placed:
     """An object's scans, and the one viewpoint from which all their poses are shown.
 
-    Args:
-        name: Of the object.
-        scans: Of the object.
-        size: Width and height of a picture, in pixels.
-        towards: Weights of the first scans' viewing directions in the viewer's.
-        margin: Left free around the object, as a share of the picture's shorter side.
+    ``towards`` holds weights of the first scans' viewing directions in the viewer's; ``size`` is
+    that of a picture in pixels, ``margin`` what is left free, as a share of its shorter side.
     """
 
     def __init__(
