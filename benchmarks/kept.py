@@ -9,8 +9,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.paper.study import Record, Result, Study, Table, Unit, read_records
 from benchmarks.results import ROOT
+from benchmarks.study.study import Record, Result, Study, Table, Unit, read_records
 from scanweld.confidence.model import Calibration, stored_calibration
 from scanweld.work.threads import single_threaded_algebra
 

@@ -1,24 +1,13 @@
 """The documentation says what the results and the code say, and its links lead somewhere."""
 
-import importlib
 import re
-import sys
 from pathlib import Path
-from types import ModuleType
 from urllib.parse import unquote
 
 import pytest
 
-from benchmarks.blocks import BLOCK
-from benchmarks.paper import ablations, method_reasons
-from benchmarks.paper.method_numbers import NUMBERS
-from benchmarks.paper.method_page import PLACE, TEMPLATE, constant, method_text
-from benchmarks.paper.method_results import Results
-from benchmarks.paper.pages import write_page
-from benchmarks.paper.study import Study, read_records
-from benchmarks.paper.tables import table, table_names
+from benchmarks.study.pages import CONSTANT, constant
 from scanweld.config import Config
-from scanweld.errors import InputError
 from scanweld.evidence import rivals
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, FREE_WEIGHT, MIN_AGREE, VIOLATION_WEIGHT
 from scanweld.evidence.visibility import AGREE_COSINE, CONTRADICT_COSINE
@@ -29,89 +18,22 @@ from scanweld.knowledge import turntable
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+TEMPLATE = ROOT / "benchmarks/paper/method_template.md"
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-MEASURED = [DOCS / "method.md", DOCS / "paper"]
-"""What stands in the repository only once the study was made."""
 
 
-@pytest.fixture
-def pages(monkeypatch: pytest.MonkeyPatch):
-    """The script benchmarks/pages.py, imported from its own folder as scripts are."""
-    folder = ROOT / "benchmarks"
-    monkeypatch.syspath_prepend(str(folder))
-    yield importlib.import_module("pages")
-    for name, module in list(sys.modules.items()):
-        if getattr(module, "__file__", None) and Path(str(module.__file__)).parent == folder:
-            del sys.modules[name]
-
-
-@pytest.mark.parametrize(
-    "path", [ROOT / "README.md", DOCS / "benchmarks.md", DOCS / "model.md"], ids=lambda p: p.name
-)
-def test_measured_parts_are_those_of_the_results(path: Path, pages: ModuleType):
-    text = path.read_text(encoding="utf-8")
-    assert BLOCK.findall(text)
-    try:
-        again = pages.rewritten(text)
-    except FileNotFoundError as error:
-        pytest.skip(f"no results yet: {error.filename}")
-    assert again == text, "run python benchmarks/pages.py"
-
-
-def test_every_measured_part_stands_somewhere(pages: ModuleType):
-    text = "".join(path.read_text(encoding="utf-8") for path in pages.PAGES)
-    assert {name for _, name, _ in BLOCK.findall(text)} == set(pages.BLOCKS)
-
-
-def test_method_is_what_its_template_and_the_results_make():
-    try:
-        text = method_text(Results(DOCS / "paper"))
-    except InputError as error:
-        pytest.skip(f"no results yet: {error}")
-    committed = (DOCS / "method.md").read_text(encoding="utf-8")
-    assert committed == text, "run python -m benchmarks.paper --pages"
-
-
-def test_method_template_names_numbers_and_constants_that_are_there():
-    places = PLACE.findall(TEMPLATE.read_text(encoding="utf-8"))
-    assert {name for equals, name in places if not equals} == set(NUMBERS)
-    for equals, path in places:
-        assert not equals or constant(path)
-    assert TEMPLATE.read_text(encoding="utf-8").count("{{") == len(places)
-
-
-def test_reasons_ask_for_variants_that_the_ablations_measure():
-    assert set(method_reasons._CONTOURS.values()) <= set(ablations.contours.VARIANTS)
-    assert set(method_reasons._HEAT.values()) <= set(ablations.heat.VARIANTS)
-    assert set(method_reasons._COARSE.values()) <= set(ablations.coarse.VARIANTS)
-    assert set(method_reasons._SCORES.values()) <= set(ablations.search.SCORES)
-    terms = {ablations.terms.ALONE, *ablations.terms.WEIGHTS}
-    assert set(method_reasons._TERMS.values()) <= terms
+def test_method_template_names_constants_that_are_there():
+    text = TEMPLATE.read_text(encoding="utf-8")
+    places = CONSTANT.findall(text)
+    assert places and text.count("{{=") == len(places)
+    for path in places:
+        assert constant(path)
 
 
 @pytest.mark.parametrize("path", ["heat.keypoints._NO_SUCH", "Config.heat.no_such", "no.such.X"])
 def test_unknown_constants_are_refused(path: str):
     with pytest.raises(ValueError, match="no such constant"):
         constant(path)
-
-
-def test_a_missing_result_is_told_in_one_line(tmp_path: Path):
-    with pytest.raises(InputError, match=r"^\S+: is missing; measure it first \(.*\)$"):
-        method_text(Results(tmp_path, tmp_path))
-
-
-# The page of the figures draws them, which takes too long here and needs the meshes.
-@pytest.mark.parametrize("name", [name for name in table_names() if name != "figures"])
-def test_pages_of_the_study_are_those_of_its_results(name: str, tmp_path: Path):
-    try:
-        records = read_records(DOCS / "paper", name)
-    except FileNotFoundError as error:
-        pytest.skip(f"no results yet: {error.filename}")
-    study = Study(out=tmp_path, work=tmp_path, workers=1, quick=False, command="")
-    write_page(table(name), records, study)
-    made = (tmp_path / f"{name}.md").read_text(encoding="utf-8")
-    committed = (DOCS / f"paper/{name}.md").read_text(encoding="utf-8")
-    assert committed == made, "run python -m benchmarks.paper --pages"
 
 
 @pytest.mark.parametrize("path", [*PAGES, TEMPLATE], ids=lambda p: p.name)
@@ -122,17 +44,9 @@ def test_links_lead_somewhere(path: Path):
             continue
         name, _, heading = unquote(link).partition("#")
         target = (folder / name).resolve() if name else path
-        if not target.exists() and _is_measured(target):
-            continue
         assert target.exists(), link
         if heading:
             assert heading in _headings(target), link
-
-
-def _is_measured(target: Path) -> bool:
-    """Whether a page or picture is missing because the study was not made."""
-    measured = any(target == place or place in target.parents for place in MEASURED)
-    return measured and not all((DOCS / f"paper/data/{n}.json").exists() for n in table_names())
 
 
 def _headings(page: Path) -> set[str]:

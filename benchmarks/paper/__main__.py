@@ -15,21 +15,27 @@ import argparse
 import os
 import shlex
 import sys
+from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-from benchmarks.paper.method_page import write_method
+from benchmarks.paper.method import write_method
 from benchmarks.paper.pages import write_index, write_page
-from benchmarks.paper.study import Study, Table, read_records
-from benchmarks.paper.tables import table, table_names
+from benchmarks.study.study import PACKAGE, Study, Table, measured, measured_by, read_records
 from scanweld.errors import InputError, ScanweldError
 from scanweld.work.threads import num_workers
 
+TABLES = ("table1", "table2", "real_pairs", "features", "ablations", "basins", "figures")
+"""In the order in which they are measured and shown; each is a module of this folder."""
+_MODULES = ("views", "real", "heat_field", "settings", "methods", "{table}")
+MEASURING = (
+    PACKAGE,
+    *(f"benchmarks/paper/{name}.py" for name in _MODULES),
+    *(f"benchmarks/paper/{name}/*.py" for name in ("baselines", "{table}")),
+)
 USAGE_ERROR = 2
 
 
@@ -42,13 +48,10 @@ def main() -> int:
         workers=num_workers(options.workers),
         quick=options.quick,
         command=shlex.join(["python", "-m", "benchmarks.paper", *sys.argv[1:]]),
+        code=MEASURING,
     )
     try:
-        tables = [table(name) for name in options.only or table_names()]
-        if options.pages:
-            _pages_again(tables, study)
-        else:
-            _measure(tables, study)
+        _run(options.only or TABLES, study, measure=not options.pages)
         if not options.only and not options.quick:
             write_method(study.out)
     except ScanweldError as error:
@@ -57,42 +60,29 @@ def main() -> int:
     return 0
 
 
-def _measure(tables: list[Table], study: Study) -> None:
-    """Measure table by table, and write each one's JSON and page as soon as it is done."""
-    columns = (
-        TextColumn("{task.description}"),
-        *(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        for one in tables:
-            task = progress.add_task(one.NAME, total=None)
-            records = study.records(
-                one, lambda done, total, t=task: progress.update(t, completed=done, total=total)
-            )
-            study.write(one, records)
-            write_page(one, records, study)
-    write_index(study)
+def table(name: str) -> Table:
+    """The table or figure of this name."""
+    if name not in TABLES:
+        raise InputError(f"{name}: no such table; there are {', '.join(TABLES)}")
+    return import_module(f"benchmarks.paper.{name}")  # type: ignore[return-value]  # a module
 
 
-def _pages_again(tables: list[Table], study: Study) -> None:
-    for one in tables:
-        try:
+def _run(names: Sequence[str], study: Study, *, measure: bool) -> None:
+    """Measure table by table, or take what stands, and write each one's page."""
+    for one in [table(name) for name in names]:
+        if measure:
+            study.write(one, measured(one, study))
+        with measured_by(f"--only {one.NAME}"):
             records = read_records(study.out, one.NAME)
-        except FileNotFoundError as error:
-            raise InputError(
-                f"{error.filename}: is missing; measure it first (--only {one.NAME})"
-            ) from error
-        write_page(one, records, study)
-    write_index(study)
+        write_page(one.NAME, records, study.out, quick=study.quick)
+    write_index(TABLES, study.out)
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.paper",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join(table_names()))
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join(TABLES))
     parser.add_argument("--quick", action="store_true", help="a handful of units, no data needed")
     parser.add_argument("--pages", action="store_true", help="write the pages anew from the JSON")
     parser.add_argument("--out", type=Path, default=Path("docs/paper"))

@@ -1,8 +1,8 @@
 """Keypoint repeatability and descriptor precision against the gap between two views."""
 
 from collections.abc import Sequence
+from itertools import product
 from math import comb
-from pathlib import Path
 
 import numpy as np
 
@@ -15,15 +15,13 @@ from benchmarks.paper.baselines.feature_views import (
     feature_view,
     is_seen,
 )
-from benchmarks.paper.features_page import FEW, tell
-from benchmarks.paper.study import Record, Result, Unit
+from benchmarks.paper.views import MADE, OBJECTS
+from benchmarks.study.study import Result, Unit
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import BoolArray, FloatArray
 
 NAME = "features"
-TITLE = "Features"
 
-OBJECTS = ("armadillo", "bunny")
 GAPS_DEG = (10, 30, 50, 70, 90, 110)
 AZIMUTHS_DEG = (0, 45, 90, 135, 180, 225, 270, 315)
 REPEATED_DIAMETERS = 0.04
@@ -38,18 +36,16 @@ NUM_DRAWS = 20
 QUESTIONS = ("nearest", "mutual", "among 8")
 
 Pair = tuple[FeatureView, FeatureView]
+Points = Sequence[FloatArray]
+"""Of each view of a pair."""
 
 
 def units(quick: bool) -> list[Unit]:
     """Pairs of views of both objects; two pairs of the creature, if quick."""
     if quick:
-        return [{"object": "creature", "azimuth": 0, "gap": gap} for gap in (30, 70)]
-    return [
-        {"object": name, "azimuth": azimuth, "gap": gap}
-        for name in OBJECTS
-        for azimuth in AZIMUTHS_DEG
-        for gap in GAPS_DEG
-    ]
+        return [{"object": MADE, "azimuth": 0, "gap": gap} for gap in (30, 70)]
+    cases = product(OBJECTS, AZIMUTHS_DEG, GAPS_DEG)
+    return [{"object": name, "azimuth": azimuth, "gap": gap} for name, azimuth, gap in cases]
 
 
 def measure(unit: Unit) -> Result:
@@ -65,14 +61,10 @@ def measure(unit: Unit) -> Result:
     return {
         "detectors": {detector: _repeatability(pair, detector) for detector in DETECTORS},
         "own": {
-            descriptor: _precision(
-                pair, name, descriptor, [view.keypoints[DETECTOR_OF[descriptor]] for view in pair]
-            )
-            for descriptor in DESCRIPTORS
+            descriptor: _precision(pair, descriptor, [view.keypoints[detector] for view in pair])
+            for descriptor, detector in DETECTOR_OF.items()
         },
-        "even": {
-            descriptor: _precision(pair, name, descriptor, even) for descriptor in DESCRIPTORS
-        },
+        "even": {descriptor: _precision(pair, descriptor, even) for descriptor in DESCRIPTORS},
     }
 
 
@@ -80,7 +72,6 @@ def _repeatability(pair: Pair, detector: str) -> Result:
     """Of a detector's keypoints, and of as many points drawn from the samples of each view."""
     keypoints = [view.keypoints[detector] for view in pair]
     samples = [view.virtual.scan.samples.points for view in pair]
-    reach = REPEATED_DIAMETERS * pair[0].virtual.diameter
     rng = np.random.default_rng(1)
     drawn = np.zeros(2)
     for _ in range(NUM_DRAWS):
@@ -88,45 +79,41 @@ def _repeatability(pair: Pair, detector: str) -> Result:
             all_points[rng.choice(len(all_points), min(len(found), len(all_points)), replace=False)]
             for all_points, found in zip(samples, keypoints, strict=True)
         ]
-        drawn += _repeated(pair, chosen, reach)
-    right, asked = map(float, _repeated(pair, keypoints, reach))
+        drawn += _repeated(pair, chosen)
+    right, asked = map(float, _repeated(pair, keypoints))
     return {
         "points": [len(found) for found in keypoints],
         "repeated": [right, asked, asked * float(drawn[0] / max(drawn[1], 1.0))],
     }
 
 
-def _repeated(pair: Pair, points: Sequence[FloatArray], reach: float) -> FloatArray:
+def _repeated(pair: Pair, points: Points) -> FloatArray:
     """How many points (2,) have one of the other view near by, and how many that view sees."""
-    is_near, seen = _truth(pair, points, reach)
+    is_near, seen = _truth(pair, points, REPEATED_DIAMETERS)
     found = is_near.any(axis=1) & seen[0], is_near.any(axis=0) & seen[1]
     return np.array([sum(f.sum() for f in found), sum(s.sum() for s in seen)], dtype=np.float64)
 
 
 def _truth(
-    pair: Pair, points: Sequence[FloatArray], reach: float
+    pair: Pair, points: Points, reach_diameters: float
 ) -> tuple[BoolArray, tuple[BoolArray, BoolArray]]:
     """Which points (N, M) of two views are the same place, and which (N,), (M,) both views see."""
-    i, j = pair
-    i_from_j = i.virtual.from_other(j.virtual)
+    i, j = (view.virtual for view in pair)
+    i_from_j = i.from_other(j)
     in_i, in_j = i_from_j.apply(points[1]), i_from_j.inverse().apply(points[0])
-    is_near = np.linalg.norm(points[0][:, None] - in_i, axis=-1) < reach
-    return is_near, (is_seen(in_j, j.virtual.scan), is_seen(in_i, i.virtual.scan))
+    apart = np.linalg.norm(points[0][:, None] - in_i, axis=-1)
+    return apart < reach_diameters * i.diameter, (is_seen(in_j, j.scan), is_seen(in_i, i.scan))
 
 
-def _precision(pair: Pair, name: str, descriptor: str, points: Sequence[FloatArray]) -> Result:
+def _precision(pair: Pair, descriptor: str, points: Points) -> Result:
     """Answers to ``QUESTIONS`` for a descriptor at some points of each view."""
     try:
-        apart = distances(descriptor, name, pair, points)
+        apart = distances(descriptor, pair, points)
     except InputError as error:
         return {"missing": str(error)}
-    reach = RIGHT_DIAMETERS * pair[0].virtual.diameter
-    is_right, (seen_i, seen_j) = _truth(pair, points, reach)
-    answers = (answer(apart, is_right, seen_i), answer(apart.T, is_right.T, seen_j))
-    return {
-        question: [answers[0][question][k] + answers[1][question][k] for k in range(3)]
-        for question in QUESTIONS
-    }
+    is_right, (seen_i, seen_j) = _truth(pair, points, RIGHT_DIAMETERS)
+    of_i, of_j = answer(apart, is_right, seen_i), answer(apart.T, is_right.T, seen_j)
+    return {question: np.add(of_i[question], of_j[question]).tolist() for question in QUESTIONS}
 
 
 def answer(apart: FloatArray, is_right: BoolArray, is_seen: BoolArray) -> dict[str, list[float]]:
@@ -151,43 +138,14 @@ def answer(apart: FloatArray, is_right: BoolArray, is_seen: BoolArray) -> dict[s
     partners = is_right.sum(axis=1)
     share = partners / others
     none = [comb(others - int(m), among.shape[1]) / comb(others, among.shape[1]) for m in partners]
-    has_partner = is_seen & (partners > 0)
     mean_share = np.full(num, share[is_seen].mean() if is_seen.any() else 0.0)
     return {
         "nearest": _counts(found, is_seen, share),
         "mutual": _counts(found, is_seen & is_mutual, mean_share),
-        "among 8": _counts(found_among, has_partner, 1 - np.array(none)),
+        "among 8": _counts(found_among, is_seen & (partners > 0), 1 - np.array(none)),
     }
 
 
 def _counts(is_found: BoolArray, is_asked: BoolArray, chance: FloatArray) -> list[float]:
     right, asked = (is_found & is_asked).sum(), is_asked.sum()
     return [float(right), float(asked), float(chance[is_asked].sum())]
-
-
-_INTRODUCTION = f"""\
-Two virtual views of an object, 240 pixels across, without noise, the second camera rolled at
-random; each number is pooled over all azimuths and both directions of each pair, a share, or a
-fraction where fewer than {FEW} were asked. In parentheses: what chance alone would give.
-
-- *Repeated*: keypoints whose place the other view sees that have a keypoint of the other view
-  within {100 * REPEATED_DIAMETERS:g} % of the diameter. By chance: as many points in each view,
-  drawn from its evenly spread samples.
-- *Nearest*, *mutual*: of the points whose place the other view sees, those whose nearest
-  descriptor lies within {100 * RIGHT_DIAMETERS:g} % of the diameter of that place; *mutual* asks
-  only those that are the nearest of their nearest, too. Not every point has a partner.
-- *Among {NUM_NEAREST}*: of the points that have a partner, those that have it among the
-  {NUM_NEAREST} nearest descriptors. By chance: a random descriptor.
-
-PA-HKS, SI-HKS and WKS are taken from the artificial mesh of each scan, at the keypoints of PA-HKS;
-FPFH comes without a detector and is taken at those of 3D Harris. HKS on the full mesh needs what no
-scan has: it sees the same surface from both sides, so that its keypoints repeat by construction.
-At evenly spread points ({NUM_EVEN} a view) all descriptors have the same task. The full mesh shows
-there what HKS can do at best: it cannot tell left from right, and no sample has its exact
-counterpart.
-"""
-
-
-def page(records: Sequence[Record], out: Path) -> str:
-    """What all objects have in common, a plot, and the tables of each object."""
-    return f"{_INTRODUCTION}\n{tell(records, out / f'{NAME}.png')}"

@@ -1,80 +1,95 @@
-"""All methods of the study by name."""
+"""All methods of the study by name, and what they make of a pair whose truth is known."""
 
+import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from benchmarks.paper.baselines import cpd, fpfh, gicp, kiss, own
-from benchmarks.paper.baselines.records import Answer, Method, ScanPair
-from scanweld.errors import InputError
+from benchmarks.paper.baselines.records import Method
+from benchmarks.paper.views import KnownPair
+from benchmarks.study.optional import is_usable, need
+from benchmarks.study.plots import Curve
+from scanweld.geometry.pose import Pose
 
-__all__ = ["METHODS", "Answer", "Entry", "Method", "ScanPair", "method"]
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """A method of the study.
 
     Attributes:
-        name: By which tables and their JSON call it.
         title: For people.
         run: The method.
+        color: Of its curves: the project's own are strong, what needs a start is grey.
         uses_start: Whether it starts at the given pose; else the pose makes no difference.
         needs: Modules of the extra ``bench`` that it imports.
     """
 
-    name: str
     title: str
     run: Method
-    uses_start: bool
+    color: str
+    uses_start: bool = False
     needs: tuple[str, ...] = ()
 
 
-_ENTRIES = (
-    Entry(name="icp", title="ICP", run=own.icp, uses_start=True),
-    Entry(name="trimmed-icp", title="trimmed ICP", run=own.trimmed_icp, uses_start=True),
-    Entry(
-        name="point-to-plane",
-        title="point-to-plane ICP",
-        run=gicp.point_to_plane,
-        uses_start=True,
-        needs=("small_gicp",),
+METHODS: dict[str, Entry] = {
+    "icp": Entry("ICP", own.icp, "#B4B9C1", True),
+    "trimmed-icp": Entry("trimmed ICP", own.trimmed_icp, "#8C929C", True),
+    "point-to-plane": Entry(
+        "point-to-plane ICP", gicp.point_to_plane, "#737880", True, ("small_gicp",)
     ),
-    Entry(name="gicp", title="GICP", run=gicp.gicp, uses_start=True, needs=("small_gicp",)),
-    Entry(name="cpd", title="CPD", run=cpd.cpd, uses_start=True, needs=("pycpd",)),
-    Entry(name="m-icc", title="M-ICC", run=own.m_icc, uses_start=True),
-    Entry(name="mm-icc", title="MM-ICC", run=own.mm_icc, uses_start=True),
-    Entry(
-        name="fpfh-ransac",
-        title="FPFH + RANSAC + ICP",
-        run=fpfh.fpfh_ransac,
-        uses_start=False,
-        needs=("open3d",),
+    "gicp": Entry("GICP", gicp.gicp, "#555B66", True, ("small_gicp",)),
+    "cpd": Entry("CPD", cpd.cpd, "#D5D8DD", True, ("pycpd",)),
+    "m-icc": Entry("M-ICC", own.m_icc, "#E3B04B", True),
+    "mm-icc": Entry("MM-ICC", own.mm_icc, "#B8860B", True),
+    "paper-coarse": Entry("the paper's coarse step", own.paper_coarse, "#E59AAA"),
+    "paper": Entry("the paper's method", own.paper, "#C2274B"),
+    "fpfh-ransac": Entry("FPFH + RANSAC + ICP", fpfh.fpfh_ransac, "#3B7D4F", needs=("open3d",)),
+    "fgr": Entry("FGR + ICP", fpfh.fgr, "#7FB38A", needs=("open3d",)),
+    "kiss-gicp": Entry(
+        "KISS-Matcher + GICP", kiss.kiss_gicp, "#7A4FA3", needs=("kiss_matcher", "small_gicp")
     ),
-    Entry(name="fgr", title="FGR + ICP", run=fpfh.fgr, uses_start=False, needs=("open3d",)),
-    Entry(
-        name="kiss-gicp",
-        title="KISS-Matcher + GICP",
-        run=kiss.kiss_gicp,
-        uses_start=False,
-        needs=("kiss_matcher", "small_gicp"),
-    ),
-    Entry(
-        name="paper-coarse",
-        title="the paper's coarse step",
-        run=own.paper_coarse,
-        uses_start=False,
-    ),
-    Entry(name="paper", title="the paper's method", run=own.paper, uses_start=False),
-    Entry(name="default", title="scanweld", run=own.default, uses_start=False),
-)
-METHODS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
+    "default": Entry("scanweld", own.default, "#1B6CA8"),
+}
+"""In the order in which tables show them."""
+BY_TITLE = {entry.title: name for name, entry in METHODS.items()}
 
 
-def method(name: str) -> Entry:
-    """The method of this name.
+def curve(name: str, shares: Sequence[float]) -> Curve:
+    """Shares of a method as plots draw them."""
+    return Curve(shares, METHODS[name].color, is_strong=name in ("default", "paper"))
 
-    Raises:
-        InputError: If there is none; the message names those that are.
+
+def try_methods(
+    names: Iterable[str], pair: KnownPair, start: Pose, seed: int
+) -> dict[str, dict[str, Any]]:
+    """Run methods on a pair, one after the other, but for those whose library is not there.
+
+    By name: "deg" and "percent" of the error, the method's "score", whether it "accepted" its pose,
+    where it says so, and its CPU "seconds". The start is an i_from_j for the methods that take one.
     """
-    if name not in METHODS:
-        raise InputError(f"{name}: no such method; there are {', '.join(METHODS)}")
-    return METHODS[name]
+    tried: dict[str, dict[str, Any]] = {}
+    missing = missing_modules()
+    for name in names:
+        if missing.intersection(METHODS[name].needs):
+            continue
+        began = time.process_time()
+        answer = METHODS[name].run(pair.scans, start, seed)
+        seconds = time.process_time() - began
+        tried[name] = {**pair.error(answer.i_from_j), "score": answer.score, "seconds": seconds}
+        if answer.accepted is not None:
+            tried[name]["accepted"] = answer.accepted
+    return tried
+
+
+def missing_modules() -> set[str]:
+    """Modules that some methods need and that cannot be used here."""
+    needed = {module for entry in METHODS.values() for module in entry.needs}
+    return {module for module in needed if not is_usable(module)}
+
+
+def need_all(names: Iterable[str]) -> None:
+    """See to it that all methods of these names can run."""
+    for name in names:
+        for module in METHODS[name].needs:
+            need(module)

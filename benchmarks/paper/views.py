@@ -1,18 +1,23 @@
-"""Virtual scans of the study's objects, pairs of them, starts and errors; all in sensor frames."""
+"""Virtual scans of the study's objects, pairs whose truth is known, starts and errors."""
 
-import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
+from benchmarks.paper.baselines.records import ScanPair
+from benchmarks.sets import data_folder
+from benchmarks.study.study import Unit
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import Axis, View, overlap, view_of
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
@@ -20,118 +25,147 @@ from scanweld.geometry.scan import principal_diameter
 from scanweld.io import read_mesh
 from scanweld.preparation import prepare
 
-Start = Literal["identity", "random"]
-
+OBJECTS = ("armadillo", "bunny")
+MADE = "creature"
+"""An object that the project makes, for quick studies."""
 PIXELS = 240.0
 """Across the object's diameter, as in the study on which the design rests."""
-UP: dict[str, Axis] = {"armadillo": "y", "bunny": "y", "creature": "z"}
-"""The study's objects, and the axis that their views go around."""
-DEFAULT_DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
+UP: dict[str, Axis] = {"armadillo": "y", "bunny": "y", MADE: "z"}
+"""The axis that the views of an object go around."""
+
+Error = dict[str, float | None]
+"""By how many degrees a pose is off ("deg"), and "percent" of the diameter; None without a pose."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class VirtualScan:
-    """A scan ready for registration, and where its sensor stood.
-
-    Attributes:
-        scan: Its scan frame is the sensor's.
-        world_from_sensor: The world is the mesh's frame.
-        view: The camera.
-        diameter: Of the object.
-    """
+    """A scan in its sensor's frame, where that stood in the mesh's, and the object's diameter."""
 
     scan: PreparedScan
     world_from_sensor: Pose
-    view: View
     diameter: float
 
     def from_other(self, other: "VirtualScan") -> Pose:
         """The true pose of another scan's sensor in this one's frame."""
         return self.world_from_sensor.inverse() @ other.world_from_sensor
 
-    def centre(self) -> np.ndarray:
+    def centre(self) -> FloatArray:
         """(3,) middle of the scan's samples."""
         return self.scan.samples.points.mean(axis=0)
 
 
-def data_folder() -> Path:
-    """Where the Stanford data are: SCANWELD_DATA, else beside the project."""
-    return Path(os.environ.get("SCANWELD_DATA", DEFAULT_DATA))
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class KnownPair:
+    """Two scans, the true i_from_j of their sensors, and the diameter of their object."""
+
+    i: PreparedScan
+    j: PreparedScan
+    true: Pose
+    diameter: float
+
+    @property
+    def scans(self) -> ScanPair:
+        """The pair as methods take it, with the diameter that a run on these scans would take."""
+        return ScanPair(i=self.i, j=self.j, diameter=(self.i.diameter + self.j.diameter) / 2)
+
+    @property
+    def centre(self) -> FloatArray:
+        """(3,) middle of the samples of j."""
+        return self.j.samples.points.mean(axis=0)
+
+    def start(self, degrees: float, seed: int) -> dict[int, Pose]:
+        """The true poses in the frame of i, j turned about its middle by a random axis."""
+        return {0: Pose.identity(), 1: disturbed(self.true, self.centre, degrees, seed)}
+
+    def any_start(self, seed: int) -> Pose:
+        """An i_from_j that turns j at random about its middle, which is laid on that of i."""
+        rotation = random_rotation(np.random.default_rng([seed, 7]))
+        middle = self.i.samples.points.mean(axis=0)
+        return Pose(rotation=rotation, translation=middle - rotation @ self.centre)
+
+    def error(self, i_from_j: Pose | None) -> Error:
+        """How far a pose is off."""
+        return pose_error(self.true, i_from_j, self.centre, self.diameter)
+
+
+def data_file(relative: str) -> Path:
+    """A file of the Stanford data.
+
+    Raises:
+        InputError: If it is missing.
+    """
+    path = data_folder(None) / relative
+    if not path.exists():
+        raise InputError(
+            f"{path}: is missing; put it there, set SCANWELD_DATA to the folder of the data, or "
+            "take --quick, which needs none"
+        )
+    return path
 
 
 @lru_cache
 def mesh_of(name: str) -> TriangleMesh:
-    """The complete surface of one of the study's objects.
+    """The complete surface of one of the study's objects."""
+    return creature() if name == MADE else read_mesh(data_file(f"meshes/{name}.ply"))
 
-    Raises:
-        InputError: If its file is missing.
-    """
-    if name == "creature":
-        return creature()
-    path = data_folder() / "meshes" / f"{name}.ply"
-    if not path.exists():
-        raise InputError(
-            f"{path}: is missing; put the mesh there, set SCANWELD_DATA to the folder of the data, "
-            "or take --quick, which needs none"
-        )
-    return read_mesh(path)
+
+def pair_units(gaps: Iterable[int], azimuths: Iterable[int], **more: Any) -> list[Unit]:
+    """Units of all pairs of views of the study's objects."""
+    for name in OBJECTS:
+        mesh_of(name)
+    return [
+        {"object": name, "gap": gap, "azimuth": azimuth, **more}
+        for name, gap, azimuth in product(OBJECTS, gaps, azimuths)
+    ]
 
 
 @lru_cache(maxsize=64)
 def virtual_scan(
     name: str, azimuth_deg: float, *, roll_deg: float = 0.0, noise: float = 0.0, seed: int = 0
 ) -> VirtualScan:
-    """Scan one of the study's objects from the side.
-
-    Args:
-        name: Of the object.
-        azimuth_deg: Of the camera.
-        roll_deg: Turn of the camera about its viewing axis.
-        noise: Standard deviation of the depth, in diameters.
-        seed: Of the noise.
-    """
-    mesh = mesh_of(name)
-    view = view_of(mesh, azimuth_deg, 0.0, roll_deg, pixels=PIXELS, up=UP[name])
-    model = NoiseModel(depth_diameters=noise)
-    scan = scan_mesh(
-        mesh, view.camera, view.world_from_sensor, model, seed, name=f"{azimuth_deg:g}"
-    )
+    """Scan an object from the side, with depth noise of a standard deviation in diameters."""
+    mesh, view = mesh_of(name), camera_view(name, azimuth_deg, roll_deg)
+    model, title = NoiseModel(depth_diameters=noise), f"{azimuth_deg:g}"
+    scan = scan_mesh(mesh, view.camera, view.world_from_sensor, model, seed, name=title)
     return VirtualScan(
         scan=prepare(scan, PrepareConfig()),
         world_from_sensor=view.world_from_sensor,
-        view=view,
         diameter=principal_diameter(mesh.vertices),
     )
+
+
+def camera_view(name: str, azimuth_deg: float, roll_deg: float = 0.0) -> View:
+    """The camera that looks at an object from the side."""
+    return view_of(mesh_of(name), azimuth_deg, 0.0, roll_deg, pixels=PIXELS, up=UP[name])
+
+
+def known_pair(i: VirtualScan, j: VirtualScan) -> KnownPair:
+    """Two virtual scans of one object."""
+    return KnownPair(i=i.scan, j=j.scan, true=i.from_other(j), diameter=i.diameter)
+
+
+def virtual_pair(name: str, azimuth: float, gap: float, noise: float = 0.0) -> KnownPair:
+    """Two scans of an object, a gap apart; the noise of the second has another seed."""
+    i = virtual_scan(name, float(azimuth), noise=noise)
+    return known_pair(i, virtual_scan(name, float(azimuth + gap), noise=noise, seed=int(noise > 0)))
 
 
 @lru_cache(maxsize=1024)
 def overlap_of(name: str, azimuth_i: float, azimuth_j: float) -> float:
     """Overlap of two views of an object; rolls do not matter."""
-    mesh = mesh_of(name)
-    i, j = (view_of(mesh, a, pixels=PIXELS, up=UP[name]) for a in (azimuth_i, azimuth_j))
-    return overlap(mesh, i, j)
+    return overlap(mesh_of(name), *(camera_view(name, a) for a in (azimuth_i, azimuth_j)))
 
 
-def start_pose(kind: Start, i: VirtualScan, j: VirtualScan, seed: int) -> Pose:
-    """Where a pair starts, i_from_j.
-
-    ``identity`` is the paper's protocol: both scans in their own camera frames. ``random`` turns j
-    by any rotation about its middle, which is laid on the middle of i.
-    """
-    if kind == "identity":
-        return Pose.identity()
-    rotation = random_rotation(np.random.default_rng([seed, 7]))
-    return Pose(rotation=rotation, translation=i.centre() - rotation @ j.centre())
-
-
-def disturbed(i_from_j: Pose, centre: np.ndarray, degrees: float, seed: int) -> Pose:
+def disturbed(i_from_j: Pose, centre: FloatArray, degrees: float, seed: int) -> Pose:
     """A pose turned by an angle about a random axis through a point (3,) of frame j."""
     axis = np.random.default_rng([seed, 11]).normal(size=3)
     rotation = rotation_exp(np.radians(degrees) * axis / np.linalg.norm(axis))
     return i_from_j @ Pose(rotation=rotation, translation=centre - rotation @ centre)
 
 
-def pose_error(true: Pose, found: Pose, centre: np.ndarray, diameter: float) -> tuple[float, float]:
-    """Error of i_from_j: degrees, and how far it puts a point (3,) of j off, in % of a diameter."""
+def pose_error(true: Pose, found: Pose | None, centre: FloatArray, diameter: float) -> Error:
+    """Error of i_from_j, its shift at a point (3,) of j."""
+    if found is None:
+        return {"deg": None, "percent": None}
     off = true.inverse() @ found
-    return off.angle_deg(), 100 * off.shift_at(centre) / diameter
+    return {"deg": off.angle_deg(), "percent": 100 * off.shift_at(centre) / diameter}

@@ -125,7 +125,7 @@ def test_digests_know_of_all_code_and_of_the_calibration(monkeypatch: pytest.Mon
 
 
 def test_a_recalibration_makes_kept_runs_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    for module in ("benchmarks.kept.ROOT", "benchmarks.paper.study._ROOT"):
+    for module in ("benchmarks.kept.ROOT", "benchmarks.study.study._ROOT"):
         monkeypatch.setattr(module, tmp_path)
     for name in ("src/scanweld/a.py", "src/scanweld/confidence/calibration.json"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,35 +1,33 @@
 """Ablations: what each part of the method is worth."""
 
-from collections.abc import Sequence
-from pathlib import Path
-
-from benchmarks.paper.ablations import coarse, contours, heat, search, terms
-from benchmarks.paper.study import Record, Result, Unit
+from benchmarks.paper.ablations import search
+from benchmarks.paper.ablations.parts import PARTS
+from benchmarks.paper.real import real_pair
+from benchmarks.paper.views import MADE, pair_units, virtual_pair
+from benchmarks.study.study import Result, Unit
 
 NAME = "ablations"
-TITLE = "Ablations"
-
-_PARTS = {"contours": contours, "terms": terms, "heat": heat, "coarse": coarse, "search": search}
 
 
 def units(quick: bool) -> list[Unit]:
-    """The units of all parts.
-
-    Raises:
-        InputError: If a mesh or the real scans are missing.
-    """
-    return [{"part": name, **u} for name, part in _PARTS.items() for u in part.units(quick)]
+    """Pairs of views for each part, and the thin ones among the real pairs for the search."""
+    if quick:
+        return [
+            {"part": name, "object": MADE, "gap": part.quick_gap, "azimuth": 0, **part.more}
+            for name, part in PARTS.items()
+        ]
+    units = [
+        {"part": name, **unit}
+        for name, part in PARTS.items()
+        for unit in pair_units(part.gaps, part.azimuths, **part.more)
+    ]
+    return [*units, *({"part": "search", **unit} for unit in search.thin_real_pairs())]
 
 
 def measure(unit: Unit) -> Result:
     """Measure one unit of its part."""
-    return _PARTS[unit["part"]].measure(unit)
-
-
-def page(records: Sequence[Record], out: Path) -> str:
-    """The tables of all parts, one below the other."""
-    told = [
-        part.page([record for record in records if record.unit["part"] == name])
-        for name, part in _PARTS.items()
-    ]
-    return "\n".join(told)
+    if "i" in unit:
+        return search.measure(real_pair(unit["object"], (), unit["i"], unit["j"]), unit)
+    noise = unit.get("noise", 0.0)
+    pair = virtual_pair(unit["object"], unit["azimuth"], unit["gap"], noise)
+    return PARTS[unit["part"]].measure(pair, unit)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.paper.baselines.records import Answer, ScanPair, closeness
-from benchmarks.paper.optional import need
+from benchmarks.study.optional import need
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 

@@ -15,19 +15,14 @@ from benchmarks.features.full_mesh_hks import (
 )
 from benchmarks.features.harris3d import harris_keypoints
 from benchmarks.features.si_hks import octave_times, si_heat_signature
-from benchmarks.features.spectrum import Spectrum, spectrum_of, values_at
+from benchmarks.features.spectrum import values_at
 from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
-from benchmarks.paper.baselines.fpfh import FEATURE_VOXELS, VOXEL
-from benchmarks.paper.optional import need
+from benchmarks.paper.baselines.fpfh import fpfh
+from benchmarks.paper.heat_field import HeatField, heat_field
 from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan
-from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import principal_diameter
-from scanweld.heat import Features, describe
-from scanweld.heat.artificial_mesh import close_front
-from scanweld.heat.front import thin_front
-from scanweld.heat.signature import diffusion_times, heat_signature
 
 DETECTORS = ("PA-HKS", "HKS, full mesh", "3D Harris", "random points")
 DETECTOR_OF = {
@@ -53,18 +48,11 @@ _SCALES = (2.0**-12, 2.0**3)
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class FeatureView:
-    """A virtual scan with what its features are made of; sensor frame.
+    """A virtual scan of an object, its heat, and keypoints (K, 3) by detector; sensor frame."""
 
-    Attributes:
-        virtual: The scan.
-        features: Its PA-HKS keypoints.
-        front: Eigenpairs of its artificial mesh, on the front's vertices.
-        keypoints: Of each detector, (K, 3).
-    """
-
+    name: str
     virtual: VirtualScan
-    features: Features
-    front: Spectrum
+    heat: HeatField
     keypoints: dict[str, FloatArray]
 
 
@@ -72,18 +60,17 @@ class FeatureView:
 def feature_view(name: str, azimuth_deg: float, roll_deg: float) -> FeatureView:
     """Scan an object from the side and find the keypoints of all detectors."""
     virtual = virtual_scan(name, azimuth_deg, roll_deg=roll_deg)
-    scan, config = virtual.scan, HeatConfig()
-    features = describe(scan, config)
-    num = len(features.points)
+    scan, heat = virtual.scan, heat_field(virtual.scan)
+    num, samples = len(heat.keypoints), scan.samples.points
     rng = np.random.default_rng([round(azimuth_deg), 3])
-    samples = scan.samples.points
+    of_full_mesh = virtual.world_from_sensor.inverse().apply(_full_mesh(name)[2])
     return FeatureView(
+        name=name,
         virtual=virtual,
-        features=features,
-        front=_front_spectrum(scan, config),
+        heat=heat,
         keypoints={
-            "PA-HKS": features.points,
-            "HKS, full mesh": _full_mesh_keypoints_in(name, virtual),
+            "PA-HKS": heat.keypoints,
+            "HKS, full mesh": of_full_mesh[is_seen(of_full_mesh, scan)],
             "3D Harris": _harris_keypoints_in(scan, num),
             "random points": samples[rng.choice(len(samples), num, replace=False)],
         },
@@ -101,82 +88,49 @@ def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
 
 
 def distances(
-    descriptor: str, name: str, views: Sequence[FeatureView], points: Sequence[FloatArray]
+    descriptor: str, views: Sequence[FeatureView], points: Sequence[FloatArray]
 ) -> FloatArray:
-    """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another.
-
-    Args:
-        descriptor: One of ``DESCRIPTORS``.
-        name: Of the object.
-        views: Two of them.
-        points: Of each, sensor frames.
-
-    Raises:
-        InputError: If the library that computes the descriptor is missing.
-    """
-    of = _DESCRIBE[descriptor]
-    one, other = (of(name, view, at) for view, at in zip(views, points, strict=True))
-    if descriptor == "WKS":
-        return wave_distances(one, other)
-    return cdist(one, other).astype(np.float64)
+    """Distances (N, M) of a descriptor between points (N, 3) of a view and (M, 3) of another."""
+    described = _DESCRIBE[descriptor]
+    one, other = (described(view, at) for view, at in zip(views, points, strict=True))
+    apart = wave_distances if descriptor == "WKS" else cdist
+    return apart(one, other).astype(np.float64)
 
 
-def _pa_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
-    spectrum, config = view.front, HeatConfig()
-    times = diffusion_times(spectrum.eigenvalues, config.num_times, config.longest_time_diameters2)
-    signature = heat_signature(spectrum.eigenvalues, spectrum.functions, times)
-    return values_at(signature, spectrum.points, points)
+def _pa_hks(view: FeatureView, points: FloatArray) -> FloatArray:
+    return values_at(view.heat.signature, view.heat.front.points, points)
 
 
-def _si_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
-    spectrum = view.front
+def _si_hks(view: FeatureView, points: FloatArray) -> FloatArray:
+    spectrum = view.heat.spectrum
     signature = si_heat_signature(spectrum.eigenvalues, spectrum.functions, octave_times(*_SCALES))
     return values_at(signature, spectrum.points, points)
 
 
-def _wks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
-    spectrum = view.front
+def _wks(view: FeatureView, points: FloatArray) -> FloatArray:
+    spectrum = view.heat.spectrum
     bands, width = energy_bands(spectrum.eigenvalues)
     signature = wave_signature(spectrum.eigenvalues, spectrum.functions, bands, width)
     return values_at(signature, spectrum.points, points)
 
 
-def _full_mesh_hks(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
-    vertices, signature, _ = _full_mesh(name)
+def _full_mesh_hks(view: FeatureView, points: FloatArray) -> FloatArray:
+    vertices, signature, _ = _full_mesh(view.name)
     return values_at(signature, vertices, view.virtual.world_from_sensor.apply(points))
 
 
-def _fpfh(name: str, view: FeatureView, points: FloatArray) -> FloatArray:
-    """Fast point feature histograms (Rusu et al. 2009), as the pair methods use them."""
-    library = need("open3d")
+def _fpfh(view: FeatureView, points: FloatArray) -> FloatArray:
     diameter, mesh = view.virtual.diameter, view.virtual.scan.mesh
-    cloud = library.geometry.PointCloud(library.utility.Vector3dVector(mesh.vertices / diameter))
-    cloud.normals = library.utility.Vector3dVector(np.array(mesh.normals))
-    cloud = cloud.voxel_down_sample(VOXEL)
-    around = library.geometry.KDTreeSearchParamHybrid(radius=FEATURE_VOXELS * VOXEL, max_nn=100)
-    found = library.pipelines.registration.compute_fpfh_feature(cloud, around)
-    _, nearest = KDTree(np.asarray(cloud.points)).query(points / diameter)
-    return np.asarray(found.data).T[nearest]
+    return fpfh(mesh.vertices / diameter, mesh.normals, points / diameter)
 
 
-_DESCRIBE: dict[str, Callable[[str, FeatureView, FloatArray], FloatArray]] = {
+_DESCRIBE: dict[str, Callable[[FeatureView, FloatArray], FloatArray]] = {
     "PA-HKS": _pa_hks,
     "SI-HKS": _si_hks,
     "WKS": _wks,
     "HKS, full mesh": _full_mesh_hks,
     "FPFH": _fpfh,
 }
-
-
-def _front_spectrum(scan: PreparedScan, config: HeatConfig) -> Spectrum:
-    front = thin_front(scan.image, config.max_front_vertices)
-    mesh = close_front(front, scan.image.camera, scan.diameter)
-    whole = spectrum_of(mesh.vertices, mesh.faces, scan.diameter, config.num_modes)
-    return Spectrum(
-        points=front.points,
-        eigenvalues=whole.eigenvalues,
-        functions=whole.functions[: mesh.num_front],
-    )
 
 
 @lru_cache
@@ -187,12 +141,6 @@ def _full_mesh(name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     signature = full_mesh_hks(spectrum)
     at = full_mesh_keypoints(spectrum, faces, signature, principal_diameter(mesh.vertices))
     return spectrum.points, signature, spectrum.points[at]
-
-
-def _full_mesh_keypoints_in(name: str, virtual: VirtualScan) -> FloatArray:
-    _, _, keypoints = _full_mesh(name)
-    points = virtual.world_from_sensor.inverse().apply(keypoints)
-    return points[is_seen(points, virtual.scan)]
 
 
 def _harris_keypoints_in(scan: PreparedScan, max_count: int) -> FloatArray:

@@ -1,12 +1,13 @@
 """GICP and point-to-plane ICP of small_gicp, from a start pose, coarse to fine."""
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from benchmarks.paper.baselines.clouds import CloudPair, cloud_pair
-from benchmarks.paper.baselines.records import Answer, ScanPair
-from benchmarks.paper.optional import need
+from benchmarks.paper.baselines.records import Answer, CloudPair, ScanPair, cloud_pair
+from benchmarks.study.optional import need
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 
@@ -21,32 +22,18 @@ EPSILON = 1e-5
 """Radians and diameters: a step below both ends a level."""
 
 
-def gicp(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """Generalised ICP (Segal et al. 2009) from the start."""
-    return _from_start(pair, start, "GICP")
-
-
-def point_to_plane(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """Point-to-plane ICP (Chen and Medioni 1992) from the start."""
-    return _from_start(pair, start, "PLANE_ICP")
-
-
 def refine(
     clouds: CloudPair,
     matrix: FloatArray,
-    kind: Kind,
-    levels: tuple[tuple[float, float], ...] = LEVELS,
+    kind: Kind = "GICP",
+    levels: Sequence[tuple[float, float]] = LEVELS,
 ) -> tuple[FloatArray, float]:
     """Refine a (4, 4) matrix between clouds; also the share of j that is matched in the end."""
     library = need("small_gicp")
+    thinned = partial(library.preprocess_points, num_neighbors=NUM_NEIGHBOURS, num_threads=1)
     share = 0.0
     for voxel, reach in levels:
-        target, tree = library.preprocess_points(
-            clouds.i.points, voxel, num_neighbors=NUM_NEIGHBOURS, num_threads=1
-        )
-        source, _ = library.preprocess_points(
-            clouds.j.points, voxel, num_neighbors=NUM_NEIGHBOURS, num_threads=1
-        )
+        (target, tree), (source, _) = (thinned(points, voxel) for points in clouds.points)
         found = library.align(
             target,
             source,
@@ -64,7 +51,13 @@ def refine(
     return matrix, share
 
 
-def _from_start(pair: ScanPair, start: Pose, kind: Kind) -> Answer:
+def gicp(pair: ScanPair, start: Pose, seed: int, kind: Kind = "GICP") -> Answer:
+    """Generalised ICP (Segal et al. 2009) from the start."""
     clouds = cloud_pair(pair)
     matrix, share = refine(clouds, clouds.matrix_of(start), kind)
     return Answer(i_from_j=clouds.pose_of(matrix), score=share)
+
+
+def point_to_plane(pair: ScanPair, start: Pose, seed: int) -> Answer:
+    """Point-to-plane ICP (Chen and Medioni 1992) from the start."""
+    return gicp(pair, start, seed, "PLANE_ICP")

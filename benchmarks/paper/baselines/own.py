@@ -1,29 +1,86 @@
-"""The project's own methods on a pair: ICP, the published method and its parts, and the default."""
+"""The project's own steps as the study calls them: the one place that knows how they are called."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial.distance import cdist
 
 from benchmarks.paper.baselines.records import Answer, ScanPair, closeness
-from scanweld.config import Config, ContoursConfig
+from scanweld.config import CoarseConfig, Config, ContoursConfig, RefineConfig
 from scanweld.contours.coherence import contour_matcher
 from scanweld.evidence.field import make_field
 from scanweld.geometry.point_fit import FRACTION_EXPONENT, Trim
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.heat.features import describe
-from scanweld.pairs.result import PairKind
-from scanweld.pipeline.robust import pair_registrar
-from scanweld.published.coarse import register_as_published
+from scanweld.heat.features import Features, describe
+from scanweld.pairs.registrar import pair_registrar
+from scanweld.pairs.result import PairKind, PairResult
+from scanweld.published.coarse import CoarseAnswer, register_as_published
 from scanweld.published.m_icc import m_icc as align_by_m_icc
 from scanweld.published.mm_icc import mm_icc as align_by_mm_icc
 from scanweld.published.outer_loop import ContourAlignment
 from scanweld.published.point_icp import point_icp
+from scanweld.published.signature_matching import match_signatures
+from scanweld.refinement.refine import refine_poses
 
+Scans = Sequence[PreparedScan]
+Poses = Mapping[int, Pose]
 Edges = Sequence[tuple[int, int]]
-Align = Callable[
-    [Sequence[PreparedScan], Mapping[int, Pose], Edges, ContoursConfig], ContourAlignment
-]
 
-AS_PUBLISHED = ContoursConfig()
+ONE_EDGE = ((0, 1),)
+_ALIGN = {"m-icc": align_by_m_icc, "mm-icc": align_by_mm_icc}
+
+
+def aligned(
+    method: str, scans: Scans, start: Poses, edges: Edges = ONE_EDGE, **settings: Any
+) -> ContourAlignment:
+    """Poses ``world_from_sensor`` by ``m-icc`` or ``mm-icc``, under other settings of contours."""
+    return _ALIGN[method](scans, start, edges, ContoursConfig(**settings))
+
+
+def jointly_refined(
+    scans: Scans, start: Poses, edges: Edges = ONE_EDGE, **settings: Any
+) -> dict[int, Pose]:
+    """Poses ``world_from_sensor`` by the joint refinement, under other settings of it."""
+    matcher = contour_matcher(scans, ContoursConfig())
+    return dict(refine_poses(scans, start, edges, RefineConfig(**settings), matcher).poses)
+
+
+def coarse_pose(
+    i: PreparedScan, j: PreparedScan, features: Sequence[Features] = (), **settings: Any
+) -> CoarseAnswer:
+    """Matched PA-HKS keypoints and ICP (paper 3.1), under another reading of them."""
+    of_i, of_j = features or [describe(scan, Config().heat) for scan in (i, j)]
+    return register_as_published(i, j, of_i, of_j, CoarseConfig(**settings))
+
+
+def right_matches(
+    i_from_j: Pose, of_i: Features, of_j: Features, reach: float, **settings: Any
+) -> list[float]:
+    """How many matches of eq. 1 are right, how many there are, and how many are right by chance.
+
+    By chance a keypoint of i that has a match has any keypoint of j.
+    """
+    matches = match_signatures(of_i.signatures, of_j.signatures, **settings)
+    apart = cdist(of_i.points[matches.s], i_from_j.apply(of_j.points))
+    is_near = apart < reach
+    right = is_near[np.arange(len(matches)), matches.t].sum()
+    by_chance = is_near.mean(axis=1).sum() if len(matches) else 0.0
+    return [float(right), float(len(matches)), float(by_chance)]
+
+
+def searched(pair: ScanPair, config: Config) -> PairResult:
+    """What a run does for a pair, features and all."""
+    scans = (pair.i, pair.j)
+    registrar = pair_registrar(
+        scans,
+        [describe(scan, config.heat) for scan in scans],
+        [make_field(scan) for scan in scans],
+        contour_matcher(scans, config.contours),
+        config,
+    )
+    return registrar.register((0, 1))
 
 
 def icp(pair: ScanPair, start: Pose, seed: int) -> Answer:
@@ -41,19 +98,17 @@ def trimmed_icp(pair: ScanPair, start: Pose, seed: int) -> Answer:
 
 def m_icc(pair: ScanPair, start: Pose, seed: int) -> Answer:
     """M-ICC from the start; its score is the coherence of the contours."""
-    return _by_contours(pair, start, align_by_m_icc)
+    return _by_contours("m-icc", pair, start)
 
 
 def mm_icc(pair: ScanPair, start: Pose, seed: int) -> Answer:
     """MM-ICC as published, from the start; its score is the coherence of the contours."""
-    return _by_contours(pair, start, align_by_mm_icc)
+    return _by_contours("mm-icc", pair, start)
 
 
 def paper_coarse(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """Matched PA-HKS keypoints and ICP (paper 3.1); its score comes of the ICP's rms."""
-    config = Config()
-    features_i, features_j = (describe(scan, config.heat) for scan in (pair.i, pair.j))
-    found = register_as_published(pair.i, pair.j, features_i, features_j, config.coarse)
+    """The published coarse step; its score comes of the ICP's rms."""
+    found = coarse_pose(pair.i, pair.j)
     if found.i_from_j is None:
         return Answer(i_from_j=None, score=0.0, reason=found.reason)
     return Answer(i_from_j=found.i_from_j, score=closeness(found.rms, pair.diameter))
@@ -66,16 +121,8 @@ def paper(pair: ScanPair, start: Pose, seed: int) -> Answer:
 
 
 def default(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """What a run does for a pair, features and all; its score is that of the best pose found."""
-    config, scans = Config(), (pair.i, pair.j)
-    registrar = pair_registrar(
-        scans,
-        [describe(scan, config.heat) for scan in scans],
-        [make_field(scan) for scan in scans],
-        contour_matcher(scans, config.contours),
-        config,
-    )
-    result = registrar.register((0, 1))
+    """The default method; its score is that of the best pose found."""
+    result = searched(pair, Config())
     best = result.best
     return Answer(
         i_from_j=best.i_from_j if best else None,
@@ -89,14 +136,12 @@ def _icp(pair: ScanPair, start: Pose, trim: Trim) -> Answer:
     samples = pair.j.samples.points
     found = point_icp(samples, pair.i.mesh.vertices, start, trim)
     share = found.num_matches / len(samples)
-    return Answer(
-        i_from_j=found.target_from_source,
-        score=closeness(found.rms / share**FRACTION_EXPONENT, pair.diameter),
-    )
+    score = closeness(found.rms / share**FRACTION_EXPONENT, pair.diameter)
+    return Answer(i_from_j=found.target_from_source, score=score)
 
 
-def _by_contours(pair: ScanPair, start: Pose, align: Align) -> Answer:
-    found = align((pair.i, pair.j), {0: Pose.identity(), 1: start}, [(0, 1)], AS_PUBLISHED)
+def _by_contours(method: str, pair: ScanPair, start: Pose) -> Answer:
+    found = aligned(method, (pair.i, pair.j), {0: Pose.identity(), 1: start})
     if found.loose:
         return Answer(i_from_j=None, score=0.0, reason="too few contours match")
     i_from_j = found.poses[0].inverse() @ found.poses[1]
