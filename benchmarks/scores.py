@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.stats import rankdata
+from scipy.stats import mannwhitneyu
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
 
 NUM_BINS = 12
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Bin:
     """Answers of about the same confidence: their mean confidence, share right, and number."""
 
@@ -23,7 +23,10 @@ class Bin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stated:
-    """Scores (N,) that are stated of answers, and which (N,) of these are right."""
+    """Scores (N,) that are stated of answers, and which (N,) of these are right.
+
+    What cannot be said of the answers there are is NaN.
+    """
 
     scores: FloatArray
     is_right: BoolArray
@@ -44,34 +47,29 @@ class Stated:
 
     @property
     def auc(self) -> float:
-        """Chance that a right answer has a higher score than a wrong one; NaN without either."""
-        num_right, num_wrong = self.num_right, len(self) - self.num_right
-        if not num_right or not num_wrong:
+        """Chance that a right answer has a higher score than a wrong one."""
+        right, wrong = self.scores[self.is_right], self.scores[~self.is_right]
+        if not len(right) or not len(wrong):
             return float("nan")
-        ranks = rankdata(self.scores)[self.is_right]
-        return float((ranks.sum() / num_right - 0.5 * (num_right + 1)) / num_wrong)
+        return float(mannwhitneyu(right, wrong, method="asymptotic")[0] / len(right) / len(wrong))
 
     def bins(self, num_bins: int = NUM_BINS) -> list[Bin]:
         """Answers in order of their score, in bins of equal numbers."""
         order = np.argsort(self.scores, kind="stable")
         return [
-            Bin(
-                confidence=float(self.scores[part].mean()),
-                right=float(self.is_right[part].mean()),
-                count=len(part),
-            )
+            Bin(float(self.scores[part].mean()), float(self.is_right[part].mean()), len(part))
             for part in np.array_split(order, num_bins)
             if len(part)
         ]
 
     def calibration_error(self, num_bins: int = NUM_BINS) -> float:
-        """Expected: mean over all answers of their bin's gap; NaN of none."""
+        """Expected: mean over all answers of their bin's gap."""
         gaps = sum(b.count * abs(b.confidence - b.right) for b in self.bins(num_bins))
         return gaps / len(self) if len(self) else float("nan")
 
     @property
     def brier(self) -> float:
-        """Mean squared difference of confidence and truth; NaN of none."""
+        """Mean squared difference of confidence and truth."""
         return float(np.mean((self.scores - self.is_right) ** 2)) if len(self) else float("nan")
 
     def risk_coverage(self) -> tuple[FloatArray, FloatArray]:
@@ -87,7 +85,7 @@ class Stated:
 
     @property
     def sure(self) -> float:
-        """Share of the right answers that score higher than any wrong one; NaN of none."""
+        """Share of the right answers that score higher than any wrong one."""
         coverage, risk = self.risk_coverage()
         taken = float(coverage[risk == 0].max(initial=0.0)) * len(self)
         return taken / self.num_right if self.num_right else float("nan")

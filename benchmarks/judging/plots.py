@@ -36,14 +36,6 @@ def draw(stated: Mapping[str, Stated], folder: Path, name: str) -> None:
     pyplot.close("all")
 
 
-def pictures(name: str, what: str) -> str:
-    """Both pictures in Markdown, of answers or poses."""
-    return (
-        f"![share of right {what} by stated confidence]({name}-reliability.png)\n\n"
-        f"![share of wrong {what} among the most confident]({name}-risk.png)\n"
-    )
-
-
 def _save(figure: Any, axes: Any, path: Path) -> None:
     axes.grid(color="#E4E6EA", linewidth=0.8)
     axes.spines[["top", "right"]].set_visible(False)

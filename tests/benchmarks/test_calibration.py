@@ -5,14 +5,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from benchmarks.blocks import rendered
 from benchmarks.calibration.collect import NUM_SETS, Sets
-from benchmarks.calibration.fit import count_frequencies, fit, held_out_probabilities, make_examples
+from benchmarks.calibration.fit import Examples, count_frequencies, fit, held_out_probabilities
 from benchmarks.calibration.learn import learn
 from benchmarks.calibration.report import calibration_told, measures
 from benchmarks.calibration.scenes import OTHER, make_set
 from benchmarks.calibration.solids import SOLIDS
 from benchmarks.judging.other_tools import OtherTools
-from benchmarks.judging.runs import Runs
+from benchmarks.judging.trial import Runs
 from benchmarks.kept import Record
 from benchmarks.scores import Stated
 from benchmarks.seeds import spent_among
@@ -58,7 +59,7 @@ def known(count: int, seed: int) -> tuple[list[dict[str, float]], FloatArray, Bo
 
 def test_the_fit_finds_probabilities_that_are_known():
     rows, _, is_right = known(4000, 0)
-    model = fit(make_examples(rows, is_right.tolist(), list(range(4000))))
+    model = fit(Examples.of(rows, is_right.tolist(), list(range(4000))))
     seen, probability, came = known(4000, 1)
     said = np.array([model.probability(row) for row in seen])
     # What tells the wrong way cannot be used: a model must not doubt what looks better.
@@ -74,7 +75,7 @@ def test_held_out_probabilities_know_nothing_of_their_set():
     groups = np.repeat(np.arange(40), 10)
     is_right = (rng.random(40) < 0.5)[groups]
     rows = [{"number": float(g), "noise": float(rng.normal())} for g in groups]
-    said = held_out_probabilities(make_examples(rows, is_right.tolist(), groups.tolist()))
+    said = held_out_probabilities(Examples.of(rows, is_right.tolist(), groups.tolist()))
     assert Stated(said, is_right).auc < 0.65
 
 
@@ -115,13 +116,13 @@ def made_record(seed: int) -> Record:
 
 def test_scans_learn_from_the_confidence_of_their_pairs():
     learned = learn([made_record(seed) for seed in range(150)], "the command")
-    assert len(learned.pairs) == len(learned.scans) == 450
+    assert len(learned.pairs.groups) == len(learned.scans.groups) == 450
     links = learned.scans.grounds[:, learned.scans.names.index("link")]
     assert links[learned.scans.is_right].mean() > links[~learned.scans.is_right].mean() + 0.3
     assert learned.stated_pairs.auc > 0.85
     assert learned.stated_scans.auc > 0.9
     again = read_calibration(learned.calibration.to_json())
     assert again.made["sets"] == 150 and again.made["command"] == "the command"
-    text = calibration_told(measures(learned))
+    text = rendered("calibration", **calibration_told(measures(learned)))
     assert "`the command`" in text and "150 sets" in text
     assert "Of the pairs have a confidence from 0.5 on" in text

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks import kept, keypoints, model, pairs, run, trust
+from benchmarks.blocks import rendered
 from benchmarks.calibration import __main__ as calibration
 from benchmarks.compare import difference
+from benchmarks.judging.page import seeds_of
 from benchmarks.kept import Kept, Result, Study, Unit, code_digest, warn_of_old_calibration
 from benchmarks.results import ROOT, read_results, write_results
-from benchmarks.seeds import FIRST_FRESH, PAGE, read_ledger, seeds_told, spent_among
+from benchmarks.seeds import FIRST_FRESH, PAGE, read_ledger, spent_among
 from benchmarks.sets import SETS, make_set, moved_scans
 from scanweld.confidence.model import read_calibration, stored_calibration
 from scanweld.errors import InputError
@@ -48,9 +50,9 @@ def test_sets_run_quickly(command: Command, tmp_path: Path, capfd: pytest.Captur
 def test_pairs_run_quickly(command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     out, plot = tmp_path / "pairs.json", tmp_path / "pairs.png"
     assert command(pairs, "--quick", "--workers", 1, "--out", out, "--plot", plot) == 0
-    answers = [pairs.Answer(**record) for record in read_results(out)["records"]]
-    assert len(answers) == 3 and sum(a.is_right for a in answers) >= 2 and plot.exists()
-    assert not any(a.kind == "good" and not a.is_right for a in answers)
+    answers = read_results(out)["records"]
+    assert len(answers) == 3 and sum(a["rank"] == 1 for a in answers) >= 2 and plot.exists()
+    assert not any(a["kind"] == "good" and a["rank"] != 1 for a in answers)
     assert "| mixed | 0.15-1.00 |" in capsys.readouterr().out
 
 
@@ -83,7 +85,7 @@ def test_trust_runs_quickly_and_not_again(
     assert page.count("Not measured yet.") == 2
     document = read_results(tmp_path / "docs/data/trust.json")
     assert document["code"] == code_digest(kept.TRUSTED)
-    monkeypatch.setattr("benchmarks.judging.runs.try_out", lambda *_: pytest.fail("run again"))
+    monkeypatch.setattr("benchmarks.judging.trial.try_out", lambda *_: pytest.fail("run again"))
     command(trust, *options)
     assert (tmp_path / "docs/trust.md").read_text(encoding="utf-8") == page
     # The same seeds for other code: they have been looked at.
@@ -165,7 +167,7 @@ def test_the_ledger_has_what_was_spent():
     for seed in (0, 199, 511, 1011, 2000, 2999, 7000, 7001, 7101, 7102, 500_000, 500_199):
         assert spent_among([seed]), seed
     assert not spent_among([*range(FIRST_FRESH, FIRST_FRESH + 1000), 7002, 7100])
-    told = seeds_told([2000, 2011])
+    told = rendered("trust-seeds", **seeds_of([2000, 2011]))
     assert "**They are spent**" in told and "41 of 48" in told and "1 of 422" in told
     with pytest.raises(ValueError, match="not a row"):
         read_ledger(PAGE.read_text(encoding="utf-8") + "\n| about 12 | tests | then | |\n")
@@ -177,10 +179,14 @@ def a_run(seed: int, **changes: Any) -> dict[str, Any]:
     return {**told, **errors, "seconds": 10.0, "cpu_seconds": 15.0, "peak_mb": 500.0, **changes}
 
 
+def set_table(runs: list[dict[str, Any]]) -> str:
+    return rendered("sets", **run.over_seeds(runs))
+
+
 def test_floors_that_are_met():
     runs = [a_run(0), a_run(1, rotation_max=0.4), a_run(2)]
     assert all(SETS["bunny4"].is_met(each) for each in runs)
-    table = run.table(runs)
+    table = set_table(runs)
     assert "| bunny4 | 3 | 4/4 | 0 | 0.100 (0.5) | 0.400 (1) |" in table and "FAIL" not in table
 
 
@@ -191,14 +197,14 @@ def test_floors_that_are_met():
 )
 def test_one_bad_seed_fails_the_set(changes: dict[str, float]):
     assert not SETS["bunny4"].is_met(a_run(1, **changes))
-    assert run.table([a_run(0), a_run(1, **changes), a_run(2)]).count("FAIL") == 1
+    assert set_table([a_run(0), a_run(1, **changes), a_run(2)]).count("FAIL") == 1
 
 
 def test_a_failed_run_has_no_errors_and_fails():
     nothing = dict.fromkeys(SETS["bunny4"].floors)
     failed = a_run(0, right=0, verdict="error", **nothing)
     assert not SETS["bunny4"].is_met(failed)
-    assert "**0/4 FAIL**" in run.table([failed])
+    assert "**0/4 FAIL**" in set_table([failed])
 
 
 def test_paired_differences():
@@ -207,18 +213,16 @@ def test_paired_differences():
 
 
 def test_floors_of_pairs():
-    def answer(score: float, rank: int | None) -> pairs.Answer:
-        return pairs.Answer(
-            anchors="mixed", object="o", seed=0, i="i", j="j", overlap=0.2, gap_deg=30.0,
-            kind="good", rotation_deg=0.0, translation_percent=0.0, score=score, evidence={},
-            margin=1.0, observability=1.0, rank=rank, seconds=0.1,
-        )  # fmt: skip
+    def answer(score: float, rank: int | None) -> dict[str, Any]:
+        errors = dict(rotation_deg=0.0, translation_percent=0.0, score=score, rank=rank)
+        return {"anchors": "mixed", "overlap": 0.2, "kind": "good", "seconds": 0.1, **errors}
 
     answers = [answer(0.9, 1), answer(0.4, 1), answer(0.5, None), answer(0.1, None)]
     assert pairs.aucs(answers)["mixed"] == pytest.approx(0.75)
     assert np.isnan(pairs.aucs(answers[:2])["mixed"])
     good = [*(answer(0.9, 1) for _ in range(19)), answer(0.1, None)]
-    assert pairs.are_floors_met(good) and "FAIL" not in pairs.table(good)
+    assert pairs.are_floors_met(good)
+    assert "FAIL" not in rendered("pairs-table", **pairs.over_pairs(good))
     for bad in ([*good, answer(0.1, None)], [*good[1:], answer(0.05, 1)]):
         assert not pairs.are_floors_met(bad)
 
