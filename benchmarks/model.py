@@ -20,8 +20,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,8 +57,7 @@ FLOORS = {
 """Accuracies in footprints (virtual) and millimetres (real)."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Size:
+class Size(NamedTuple):
     """Virtual scans, a pixel's footprint in object diameters, samples of a surface, many scans."""
 
     num_views: int = 12
@@ -72,11 +72,19 @@ QUICK = Size(num_views=6, footprint=0.008, num_samples=8000, many=3, many_pixels
 
 def main() -> int:
     """Measure; print the tables."""
-    options = _options()
+    parser = argparse.ArgumentParser(description="How good the fused model is.")
+    kinds = {"virtual": virtual, "real": real, "many": many}
+    add = parser.add_argument
+    add("--kinds", nargs="+", choices=list(kinds), default=list(kinds))
+    add("--quick", action="store_true", help="small, of an object that it makes")
+    add("--data", type=Path, help="folder of the Stanford data")
+    add("--workers", type=int, default=2)
+    add("--out", type=Path, help="JSON file of all records")
+    add("--fuse", nargs=2, type=Path, metavar=("SCANS", "TOLD"))
+    options = parser.parse_args()
     if options.fuse:
         fuse_folder(options.fuse[0], options.fuse[1], options.workers)
         return 0
-    kinds = {"virtual": virtual, "real": real, "many": many}
     records: list[Json] = []
     for kind in ("virtual", "many") if options.quick else options.kinds:
         with single_threaded_algebra():
@@ -191,18 +199,6 @@ def _found(
         raise RuntimeError(f"not all scans were placed: {result.reasons}")
     world = truth[names[0]] @ result.poses[names[0]].inverse()
     return [world @ result.poses[scan.name] @ scan.scan_from_sensor for scan in prepared]
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="How good the fused model is.")
-    kinds = ("virtual", "real", "many")
-    parser.add_argument("--kinds", nargs="+", choices=kinds, default=list(kinds))
-    parser.add_argument("--quick", action="store_true", help="small, of an object that it makes")
-    parser.add_argument("--data", type=Path, help="folder of the Stanford data")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="JSON file of all records")
-    parser.add_argument("--fuse", nargs=2, type=Path, metavar=("SCANS", "TOLD"))
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

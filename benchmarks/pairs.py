@@ -15,11 +15,12 @@ import argparse
 import csv
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import combinations, pairwise
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import combinations, pairwise, product
 from pathlib import Path
 from statistics import mean
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,8 +58,7 @@ WIDE, THIN = (0.10, np.inf), (0.05, 0.10)
 """Overlaps of the pairs that pages tell of in words."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Scans:
+class Scans(NamedTuple):
     """Scans of an object, their true poses, and the pairs that are asked for."""
 
     name: str
@@ -69,17 +69,23 @@ class Scans:
 
 def main() -> int:
     """Register all pairs; 0 if the floors are met, else 1."""
-    options = _options()
-    if options.quick:
-        objects = [made_scans()]
-    else:
-        objects = [real_scans(name, data_folder(options.data)) for name in options.objects]
+    parser = argparse.ArgumentParser(description="Register pairs of real scans from any start.")
+    add = parser.add_argument
+    add("--objects", nargs="+", choices=list(OBJECTS), default=list(OBJECTS))
+    add("--quick", action="store_true", help="a few pairs of a made object")
+    add("--seeds", type=int, default=1, help="number of random frames of each scan")
+    add("--workers", type=int, default=2)
+    add("--keypoints", nargs="+", choices=KEYPOINTS, default=["mixed"])
+    add("--data", type=Path, help="folder of the Stanford data")
+    add("--out", type=Path, help="JSON file of all answers")
+    add("--plot", type=Path, help="PNG file, of the last kind of keypoints")
+    options = parser.parse_args()
+    data = data_folder(options.data)
+    objects = [made_scans()] if options.quick else [real_scans(n, data) for n in options.objects]
     answers: list[Json] = []
-    for anchors in options.keypoints:
-        for scans in objects:
-            for seed in range(options.seeds):
-                print(f"{anchors}, {scans.name} seed {seed}", file=sys.stderr, flush=True)
-                answers += answers_of(scans, seed, anchors, options.workers)
+    for anchors, scans, seed in product(options.keypoints, objects, range(options.seeds)):
+        print(f"{anchors}, {scans.name} seed {seed}", file=sys.stderr, flush=True)
+        answers += answers_of(scans, seed, anchors, options.workers)
     if options.out:
         write_results(options.out, answers)
     if options.plot:
@@ -123,66 +129,58 @@ def answers_of(scans: Scans, seed: int, anchors: str, workers: int) -> list[Json
     An answer has the anchors that its hypotheses hung on, the pair, the errors, score and evidence
     of the first alternative (None where there is no pose), and the rank of the first right one.
     """
+    config = Config(pairs=PairsConfig.model_validate({"keypoints": anchors}))
     with single_threaded_algebra():
         moved, truth = moved_scans(
             scans.scans, scans.world_from_scan, seed, any_rotation=True, turn_grids=True
         )
-        prepared, register = _registrar(moved, anchors, workers)
+        # As a run does: the method's own way to register two scans, by index.
+        prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), moved, workers))
+        fields = list(map_in_order(make_field, prepared, workers))
+        features = [None] * len(prepared)
+        if anchors != "even":
+            features = list(map_in_order(lambda p: describe(p, config.heat), prepared, workers))
+        contours = contour_matcher(prepared, config.contours)
+        registrar = pair_registrar(prepared, features, fields, contours, config)
         diameter = object_diameter(moved, truth)
 
         def answer(edge: tuple[str, str]) -> Json:
-            at = [k for k, scan in enumerate(prepared) if scan.name in edge]
-            i, j = (prepared[k] for k in at)
+            at_i, at_j = (k for k, scan in enumerate(prepared) if scan.name in edge)
+            i, j = prepared[at_i], prepared[at_j]
             start = time.perf_counter()
-            result = register((at[0], at[1]))
+            result = registrar.register((at_i, at_j))
             seconds = time.perf_counter() - start
             true = truth[i.name].inverse() @ truth[j.name]
-            errors = []
-            for each in result.alternatives:
-                found = i.scan_from_sensor @ each.i_from_j @ j.scan_from_sensor.inverse()
-                off = true.inverse() @ found
-                shift = off.shift_at(j.scan.points.mean(axis=0))
-                errors.append((off.angle_deg(), 100.0 * shift / diameter))
+            errors = [_error(i, j, each.i_from_j, true) for each in result.alternatives]
             overlap, gap_deg = scans.pairs[edge]
             return {
                 **{"anchors": anchors, "object": scans.name, "seed": seed, "i": i.name},
                 **{"j": j.name, "overlap": overlap, "gap_deg": gap_deg},
-                **_told(result, errors),
+                **_told(result, [(turn, 100.0 * shift / diameter) for turn, shift in errors]),
                 "seconds": seconds,
             }
 
         return list(map_in_order(answer, list(scans.pairs), workers))
 
 
+def _error(i: PreparedScan, j: PreparedScan, i_from_j: Pose, true: Pose) -> tuple[float, float]:
+    """Rotation in degrees, and translation at j's centroid."""
+    off = true.inverse() @ i.scan_from_sensor @ i_from_j @ j.scan_from_sensor.inverse()
+    return off.angle_deg(), off.shift_at(j.scan.points.mean(axis=0))
+
+
 def _told(result: PairResult, errors: Sequence[tuple[float, float]]) -> Json:
     """What a pair's result says, and the errors of its answers in degrees and percent."""
-    limits = MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT
+    limits, best = (MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT), result.best
     right = [k for k, (r, t) in enumerate(errors, 1) if r <= limits[0] and t <= limits[1]]
     rotation, translation = errors[0] if errors else (None, None)
     return {
-        "kind": str(result.kind),
-        "rotation_deg": rotation,
-        "translation_percent": translation,
-        "score": result.best.score if result.best else None,
-        "evidence": asdict(result.best.evidence) if result.best else {},
-        "margin": result.margin,
-        "observability": result.observability,
+        **{"kind": str(result.kind), "rotation_deg": rotation, "translation_percent": translation},
+        "score": best.score if best else None,
+        "evidence": asdict(best.evidence) if best else {},
+        **{"margin": result.margin, "observability": result.observability},
         "rank": right[0] if right else None,
     }
-
-
-def _registrar(
-    scans: Sequence[RangeScan], anchors: str, workers: int
-) -> tuple[list[PreparedScan], Callable[[tuple[int, int]], PairResult]]:
-    """Prepare scans as a run does; the method's own way to register two of them, by index."""
-    config = Config(pairs=PairsConfig.model_validate({"keypoints": anchors}))
-    prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), scans, workers))
-    fields = list(map_in_order(make_field, prepared, workers))
-    features = [None] * len(prepared)
-    if anchors != "even":
-        features = list(map_in_order(lambda scan: describe(scan, config.heat), prepared, workers))
-    contours = contour_matcher(prepared, config.contours)
-    return prepared, pair_registrar(prepared, features, fields, contours, config).register
 
 
 def over_pairs(answers: Sequence[Json]) -> Json:
@@ -197,7 +195,12 @@ def over_pairs(answers: Sequence[Json]) -> Json:
         if (inside := [a for a in of if low <= a["overlap"] < high])
     ]
     in_all = {kind: _in_all(of) for kind, of in kinds.items()}
-    return {"bins": bins, "aucs": aucs(answers), "min_auc": MIN_AUC, "in_all": in_all}
+    stated = {
+        kind: Stated.of((a["score"], a["rank"] == 1) for a in of if a["score"] is not None)
+        for kind, of in kinds.items()
+    }
+    areas = {kind: of.auc for kind, of in stated.items()}
+    return {"bins": bins, "aucs": areas, "min_auc": MIN_AUC, "in_all": in_all}
 
 
 def _in_bin(answers: Sequence[Json], floor: float | None) -> Json:
@@ -245,15 +248,6 @@ def are_floors_met(answers: Sequence[Json]) -> bool:
     return all(b["is_met"] for b in found["bins"]) and all(area >= MIN_AUC for area in areas)
 
 
-def aucs(answers: Sequence[Json]) -> dict[str, float]:
-    """By anchors: chance that a right first answer scores higher than a wrong one."""
-    scored = [a for a in answers if a["score"] is not None]
-    return {
-        kind: Stated.of((a["score"], a["rank"] == 1) for a in scored if a["anchors"] == kind).auc
-        for kind in dict.fromkeys(a["anchors"] for a in answers)
-    }
-
-
 def plot(answers: Sequence[Json], path: Path) -> None:
     """Score against overlap, right and wrong, and the share of right answers by overlap."""
     import matplotlib
@@ -283,20 +277,6 @@ def plot(answers: Sequence[Json], path: Path) -> None:
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Register pairs of real scans from any start.")
-    add = parser.add_argument
-    add("--objects", nargs="+", choices=list(OBJECTS), default=list(OBJECTS))
-    add("--quick", action="store_true", help="a few pairs of a made object")
-    add("--seeds", type=int, default=1, help="number of random frames of each scan")
-    add("--workers", type=int, default=2)
-    add("--keypoints", nargs="+", choices=KEYPOINTS, default=["mixed"])
-    add("--data", type=Path, help="folder of the Stanford data")
-    add("--out", type=Path, help="JSON file of all answers")
-    add("--plot", type=Path, help="PNG file, of the last kind of keypoints")
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

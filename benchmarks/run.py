@@ -55,7 +55,18 @@ COLUMNS = (
 
 def main() -> int:
     """Run the sets; 0 if all floors are met, else 1."""
-    options = _options()
+    parser = argparse.ArgumentParser(description="Run the main job on sets of scans.")
+    add = parser.add_argument
+    add("--sets", nargs="+", choices=list(ALL), default=list(SETS), metavar="SET")
+    add("--seeds", type=int, default=3, help="number of orders, names and frames")
+    add("--quick", action="store_true", help="one small set that needs no data")
+    add("--workers", type=int, default=2)
+    add("--data", type=Path, help="folder of the Stanford data")
+    add("--out", type=Path, help="JSON file of all runs")
+    add("--keep", type=Path, help="folder for the models of all runs")
+    add("--cold", action="store_true", help="compile anew, as after installation")
+    add("extra", nargs="*", help="further options of scanweld run, after --")
+    options = parser.parse_args()
     warn_of_old_calibration()
     names, seeds = (list(QUICK), 1) if options.quick else (options.sets, options.seeds)
     runs: list[Json] = []
@@ -144,21 +155,6 @@ def _over_seeds(name: str, runs: Sequence[Json]) -> Json:
         **{c.key: c.together(values) if values else None for c, values in known.items()},
         "verdicts": sorted({run["verdict"] for run in runs}),
     }
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Run the main job on sets of scans.")
-    add = parser.add_argument
-    add("--sets", nargs="+", choices=list(ALL), default=list(SETS), metavar="SET")
-    add("--seeds", type=int, default=3, help="number of orders, names and frames")
-    add("--quick", action="store_true", help="one small set that needs no data")
-    add("--workers", type=int, default=2)
-    add("--data", type=Path, help="folder of the Stanford data")
-    add("--out", type=Path, help="JSON file of all runs")
-    add("--keep", type=Path, help="folder for the models of all runs")
-    add("--cold", action="store_true", help="compile anew, as after installation")
-    add("extra", nargs="*", help="further options of scanweld run, after --")
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

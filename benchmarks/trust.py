@@ -38,7 +38,18 @@ PRINTED = ("trust-seeds", "trust-floors", "trust-scenarios", "trust-rivals", "tr
 
 def main() -> int:
     """Make runs, comparison and page; 0 if all floors are met or only the page was asked for."""
-    options = _options()
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.trust",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--only", nargs="+", choices=SCENARIOS, default=tuple(SCENARIOS), metavar="NAME")
+    add("--seeds", type=int, default=10**6, help="of each scenario, at most (default: its own)")
+    add("--first-seed", type=int, default=FIRST_FRESH, help="see benchmarks/SEEDS.md")
+    add("--compare", action="store_true", help="other tools on some pairs too (extra: bench)")
+    add("--pages", action="store_true", help="only write the page anew")
+    options = add_options(parser, "--jobs", "trust").parse_args()
     warn_of_old_calibration()
     if not options.pages:
         runs = Runs(scenarios=options.only, seeds=options.seeds, first_seed=options.first_seed)
@@ -78,21 +89,6 @@ def refuse_seen_seeds(units: list[Unit], out: Path) -> None:
             f"seeds {fresh[0]} to {fresh[-1]} were already looked at in {PAGE}: enter them into "
             "benchmarks/SEEDS.md and measure fresh ones, as it says"
         )
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.trust",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add = parser.add_argument
-    add("--only", nargs="+", choices=SCENARIOS, default=tuple(SCENARIOS), metavar="NAME")
-    add("--seeds", type=int, default=10**6, help="of each scenario, at most (default: its own)")
-    add("--first-seed", type=int, default=FIRST_FRESH, help="see benchmarks/SEEDS.md")
-    add("--compare", action="store_true", help="other tools on some pairs too (extra: bench)")
-    add("--pages", action="store_true", help="only write the page anew")
-    return add_options(parser, "--jobs", "trust").parse_args()
 
 
 if __name__ == "__main__":

@@ -13,26 +13,15 @@ _STILL = 1e-7
 """Steps shorter than this share of the reference's extent have arrived."""
 
 
-def fit_surface(
-    model: TriangleMesh, reference: TriangleMesh, *, num_samples: int = 50_000, seed: int = 0
-) -> Pose:
-    """Point-to-plane ICP of a model that lies nearly right: reference_from_model.
-
-    Args:
-        model: The surface that is moved.
-        reference: The surface that stays.
-        num_samples: On each of them.
-        seed: Of the samples.
-    """
-    rng = np.random.default_rng(seed)
+def fit_surface(model: TriangleMesh, reference: TriangleMesh, *, num_samples: int) -> Pose:
+    """Point-to-plane ICP of samples of a model that lies nearly right: reference_from_model."""
+    rng = np.random.default_rng(0)
     moving, _ = sample_surface(model, num_samples, rng)
     target, face_of = sample_surface(reference, num_samples, rng)
     normals = face_normals(reference.vertices, reference.faces)[face_of]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    centre = target.mean(axis=0)
+    centre, tree, pose = target.mean(axis=0), KDTree(target), Pose.identity()
     arm = float(np.linalg.norm(np.ptp(target, axis=0)))
-    tree = KDTree(target)
-    pose = Pose.identity()
     for _ in range(_NUM_ROUNDS):
         points = pose.apply(moving)
         nearest = tree.query(points)[1]
