@@ -11,9 +11,9 @@ at 8 is the share of repeated keypoints whose partner is among the 8 nearest sig
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +40,7 @@ NEAREST = 8
 COLUMNS = ("keypoints", "repeated", "repeated_chance", "recall", "recall_chance", "seconds")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Seen:
+class Seen(NamedTuple):
     """A described view."""
 
     world_from_sensor: Pose
@@ -106,8 +105,7 @@ def look(mesh: TriangleMesh, azimuth_deg: float, up: Axis) -> Seen:
     scan = prepare(scan_mesh(mesh, view.camera, pose), PrepareConfig())
     start = time.perf_counter()
     features = describe(scan, HeatConfig())
-    seconds = time.perf_counter() - start
-    return Seen(world_from_sensor=pose, scan=scan, features=features, seconds=seconds)
+    return Seen(pose, scan, features, time.perf_counter() - start)
 
 
 def compare(i: Seen, j: Seen) -> dict[str, float | None]:

@@ -4,16 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from benchmarks.judging.outcomes import (
-    CRASH,
-    Outcome,
-    ScanOutcome,
-    determined,
-    posed_pairs,
-    scans_of,
-    share,
-    stated_pairs,
-)
+from benchmarks.judging import outcomes as of
+from benchmarks.judging.outcomes import Outcome, ScanOutcome, determined, share
 from benchmarks.scores import bound
 from benchmarks.sets import SETS
 from benchmarks.virtual.scene import Group
@@ -39,10 +31,9 @@ class Floor(NamedTuple):
 
 def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
     """All floors but those of the real sets."""
-    scans, pairs = scans_of(outcomes), stated_pairs(outcomes)
+    scans = of.scans_of(outcomes)
     good = [scan for scan in scans if scan.is_good]
     strangers = [scan for scan in scans if scan.is_stranger]
-    error, crashes = pairs.calibration_error(), sum(o.verdict == CRASH for o in outcomes)
     return [
         _none(
             "scans called good that are wrong, or whose pose nothing determines",
@@ -55,23 +46,16 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
             {f"of {len(strangers)}": sum(scan.is_good for scan in strangers)},
             [outcome for outcome in outcomes if any(s.is_stranger for s in outcome.scans)],
         ),
-        _clean(outcomes),
+        _clean(determined(o for o in outcomes if o.group is Group.CLEAN)),
         _worst(outcomes, Group.HARD, MIN_HARD, "each hard condition alone"),
         _worst(outcomes, Group.CROP, MIN_CROP, "each crop alone"),
         _scaled([scan for scan in scans if scan.factor != 1.0]),
-        Floor(
-            "confidence of pairs, right against wrong: AUC",
-            f">= {MIN_AUC:g}",
-            f"{pairs.auc:.4f} of {len(pairs)} pairs, {pairs.num_right} right",
-            pairs.auc >= MIN_AUC if len(pairs) else None,
+        *_confidence(outcomes),
+        _none(
+            "runs that crash",
+            {f"of {len(outcomes)}": sum(o.verdict == of.CRASH for o in outcomes)},
+            outcomes,
         ),
-        Floor(
-            "the same: expected calibration error",
-            f"<= {MAX_CALIBRATION_ERROR:g}",
-            f"{error:.4f}",
-            error <= MAX_CALIBRATION_ERROR if len(pairs) else None,
-        ),
-        _none("runs that crash", {f"of {len(outcomes)}": crashes}, outcomes),
     ]
 
 
@@ -94,15 +78,15 @@ def names_factor(scan: ScanOutcome) -> bool:
 
 def _none(measure: str, counts: Mapping[str, int], runs: Sequence[Outcome]) -> Floor:
     """Something that must not happen in any of these runs; beside a zero stands its bound."""
-    told = ", ".join(f"{count} {of}" for of, count in counts.items())
+    told = ", ".join(f"{count} {of_what}" for of_what, count in counts.items())
     is_met = not any(counts.values())
     return Floor(measure, "0", told + (f" ({bound(len(runs))})" if is_met and runs else ""), is_met)
 
 
 def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     """Poses that are asserted although several explain what the scans show."""
-    scans = [scan for scan in scans_of(outcomes) if scan.is_open]
-    pairs = [pair for pair in posed_pairs(outcomes) if pair.is_open]
+    scans = [scan for scan in of.scans_of(outcomes) if scan.is_open]
+    pairs = [pair for pair in of.posed_pairs(outcomes) if pair.is_open]
     counts = {
         f"of {len(some)} {name}": sum((each.confidence or 0.0) > ASSERTED for each in some)
         for name, some in (("scans", scans), ("pairs", pairs))
@@ -114,35 +98,39 @@ def _asserted(outcomes: Sequence[Outcome]) -> Floor:
 
 def _scaled(scans: Sequence[ScanOutcome]) -> Floor:
     not_good, named = sum(not s.is_good for s in scans), sum(map(names_factor, scans))
-    return Floor(
-        "a scan whose scale is wrong by 1 %: doubtful or refused, with the factor",
-        "all",
-        f"{not_good} of {len(scans)}, with the factor {named}",
-        not_good == named == len(scans) if scans else None,
-    )
+    measure = "a scan whose scale is wrong by 1 %: doubtful or refused, with the factor"
+    is_met = not_good == named == len(scans) if scans else None
+    return Floor(measure, "all", f"{not_good} of {len(scans)}, with the factor {named}", is_met)
 
 
-def _clean(outcomes: Sequence[Outcome]) -> Floor:
-    scans = determined(o for o in outcomes if o.group is Group.CLEAN)
-    reached = share(scans, "is_good", "is_right")
-    return Floor(
-        "clean scenarios: scans called good and right",
-        f">= {100 * MIN_CLEAN:g} %",
-        f"{100 * reached:.1f} % of {len(scans)}",
-        reached >= MIN_CLEAN if scans else None,
-    )
+def _clean(scans: Sequence[ScanOutcome]) -> Floor:
+    reached, asked = share(scans, "is_good", "is_right"), f">= {100 * MIN_CLEAN:g} %"
+    told, is_met = f"{100 * reached:.1f} % of {len(scans)}", reached >= MIN_CLEAN
+    measure = "clean scenarios: scans called good and right"
+    return Floor(measure, asked, told, is_met if scans else None)
 
 
 def _worst(outcomes: Sequence[Outcome], group: Group, floor: float, told: str) -> Floor:
     """The scenario of a group with the fewest right scans of those that belong."""
     names = dict.fromkeys(o.scenario for o in outcomes if o.group is group)
     scans = {name: determined(o for o in outcomes if o.scenario == name) for name in names}
-    shares = {name: share(of, "is_right") for name, of in scans.items()}
+    shares = {name: share(some, "is_right") for name, some in scans.items()}
     missed = [name for name in shares if not shares[name] >= floor]
     worst = min(shares, key=lambda name: shares[name], default="none")
     reached = f"least: {worst}, {100 * shares[worst]:.0f} %" if shares else "not measured"
     if missed:
         reached += f"; {len(missed)} of {len(shares)} below"
-    is_met = not missed if shares else None
-    measure = f"{told}: right, of the scans that belong"
+    measure, is_met = f"{told}: right, of the scans that belong", not missed if shares else None
     return Floor(measure, f">= {100 * floor:g} %", reached, is_met)
+
+
+def _confidence(outcomes: Sequence[Outcome]) -> list[Floor]:
+    pairs = of.stated_pairs(outcomes)
+    area, error, is_any = pairs.auc, pairs.calibration_error(), len(pairs) > 0
+    told = f"{area:.4f} of {len(pairs)} pairs, {pairs.num_right} right"
+    auc, ece = "confidence of pairs, right against wrong: AUC", "expected calibration error"
+    is_near = error <= MAX_CALIBRATION_ERROR if is_any else None
+    return [
+        Floor(auc, f">= {MIN_AUC:g}", told, area >= MIN_AUC if is_any else None),
+        Floor(f"the same: {ece}", f"<= {MAX_CALIBRATION_ERROR:g}", f"{error:.4f}", is_near),
+    ]
