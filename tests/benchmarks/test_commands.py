@@ -12,8 +12,9 @@ from benchmarks import kept, keypoints, model, pairs, run, trust
 from benchmarks.blocks import rendered
 from benchmarks.calibration import __main__ as calibration
 from benchmarks.compare import difference
+from benchmarks.judging import trial
 from benchmarks.judging.page import seeds_of
-from benchmarks.kept import Kept, Result, Study, Unit, code_digest, warn_of_old_calibration
+from benchmarks.kept import Study, Unit, code_digest, warn_of_old_calibration
 from benchmarks.results import ROOT, read_results, write_results
 from benchmarks.seeds import FIRST_FRESH, PAGE, read_ledger, spent_among
 from benchmarks.sets import SETS, make_set, moved_scans
@@ -125,29 +126,19 @@ def test_digests_know_of_all_code_and_of_the_calibration():
 def test_a_recalibration_makes_kept_runs_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for module in ("benchmarks.kept.ROOT", "benchmarks.paper.study._ROOT"):
         monkeypatch.setattr(module, tmp_path)
-    for name in ("src/scanweld/a.py", "src/scanweld/confidence/calibration.json"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("1")
-    measured: list[int] = []
-
-    class One(Kept):
-        NAME: str = "one"
-        TITLE: str = "One"
-
-        def units(self, quick: bool) -> list[Unit]:
-            return [{"seed": 1}]
-
-        def measure(self, unit: Unit) -> Result:
-            measured.append(1)
-            return {}
-
+    text = tmp_path / "src/scanweld/confidence/calibration.json"
+    text.parent.mkdir(parents=True)
+    (tmp_path / "src/scanweld/a.py").write_text("1")
+    made: list[Unit] = []
+    runs = trial.Runs(scenarios=("hand",), seeds=1)
+    monkeypatch.setattr(trial.Runs, "measure", lambda self, unit: made.append(unit) or {})
     study = Study(
         out=tmp_path, work=tmp_path, workers=1, quick=False, command="", code=kept.TRUSTED
     )
-    for text, count in (("1", 1), ("1", 1), ("2", 2)):
-        (tmp_path / "src/scanweld/confidence/calibration.json").write_text(text)
-        kept.measured(One(), study)
-        assert len(measured) == count
+    for content, count in (("1", 1), ("1", 1), ("2", 2)):
+        text.write_text(content)
+        kept.measured(runs, study)
+        assert len(made) == count
 
 
 def test_results_say_what_measured_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

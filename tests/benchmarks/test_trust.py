@@ -27,13 +27,17 @@ from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import Reconstruction, ScanReport, ScanVerdict
 from tests.results import a_pair, a_result
 
-CLEAN = "ring of 6"
+CLEAN, FALSE = "ring of 6", "called good that are wrong"
 TURN = Pose.exp([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
 
 
 @cache
 def scene_of(name: str) -> Scene:
     return make_scene(SCENARIOS[name], 1)
+
+
+def is_met(outcome: Outcome, measure: str) -> bool | None:
+    return floor_of([outcome], measure).is_met
 
 
 def told_as_true(scene: Scene, world: int = 0) -> Reconstruction:
@@ -74,52 +78,43 @@ def floor_of(outcomes: list[Outcome], measure: str) -> Floor:
     return found
 
 
-def misses(outcome: Outcome) -> str:
-    return rendered("trust-misses", **page.misses([outcome]))
-
-
-def scenario_table(outcomes: list[Outcome]) -> str:
-    return rendered("trust-scenarios", **page.by_scenario(outcomes))
-
-
-def kind_table(outcomes: list[Outcome]) -> str:
-    return rendered("trust-kinds", **page.by_kind(outcomes))
+def told(template: str, *outcomes: Outcome) -> str:
+    make = {"trust-misses": page.misses, "trust-scenarios": page.by_scenario}
+    return rendered(template, **make.get(template, page.by_kind)(outcomes))
 
 
 def test_a_run_that_tells_the_truth_is_right():
     outcome = outcome_of(CLEAN)
     assert all(scan.is_right and scan.is_good and not scan.is_false for scan in outcome.scans)
     assert all(pair and pair.is_right for pair in outcome.pairs)
-    assert floor_of([outcome], "clean").is_met
-    assert floor_of([outcome], "called good that are wrong").is_met
-    assert misses(outcome) == "None.\n"
+    assert is_met(outcome, "clean") and is_met(outcome, FALSE)
+    assert told("trust-misses", outcome) == "None.\n"
+    assert floor_of([outcome], "AUC").asked == ">= 0.99"
+    names = [floor.measure for floor in floors([])]
+    assert len(names) == len(set(names)) == 10
 
 
 def test_a_wrong_scan_is_falsely_good_only_if_it_is_called_good():
-    outcome = outcome_of(CLEAN, one_moved())
-    assert [scan.is_false for scan in outcome.scans].count(True) == 1
-    assert floor_of([outcome], "called good that are wrong").is_met is False
-    assert "**falsely good**" in misses(outcome) and "| **1** |" in scenario_table([outcome])
-    doubtful = ScanReport(verdict=ScanVerdict.DOUBTFUL, reason="hardly fits")
     found = one_moved()
+    outcome = outcome_of(CLEAN, found)
+    assert [scan.is_false for scan in outcome.scans].count(True) == 1
+    assert is_met(outcome, FALSE) is False and "| **1** |" in told("trust-scenarios", outcome)
+    assert "**falsely good**" in told("trust-misses", outcome)
+    doubtful = ScanReport(verdict=ScanVerdict.DOUBTFUL, reason="hardly fits")
     outcome = outcome_of(CLEAN, replace(found, scans={**found.scans, "scan_03": doubtful}))
-    assert floor_of([outcome], "called good that are wrong").is_met
-    assert floor_of([outcome], "clean").is_met is False
-    assert "1 of 6 not right" in misses(outcome)
+    assert is_met(outcome, FALSE) and is_met(outcome, "clean") is False
+    assert "1 of 6 not right" in told("trust-misses", outcome)
 
 
 def test_any_pose_of_a_symmetric_object_is_falsely_good_and_asserted_from_a_half_on():
     outcome = outcome_of("box")
-    assert all(scan.is_false for scan in outcome.scans)
+    assert all(scan.is_false for scan in outcome.scans) and is_met(outcome, FALSE) is False
     assert not any(pair and pair.is_right for pair in outcome.pairs)
-    assert floor_of([outcome], "called good that are wrong").is_met is False
-    for confidence, is_met in ((0.6, False), (0.4, True)):
-        assert floor_of([with_confidence(outcome, confidence)], "pose asserted").is_met is is_met
+    assert is_met(with_confidence(outcome, 0.6), "pose asserted") is False
+    assert is_met(with_confidence(outcome, 0.4), "pose asserted")
     clean = floor_of([with_confidence(outcome_of(CLEAN), 0.99)], "pose asserted")
     assert "0 of 0 scans" in clean.reached and clean.is_met is None
-
-
-def test_scans_without_the_mark_are_open_and_the_others_are_not():
+    # Only the scans that show the mark are determined.
     scene = scene_of("vase with a knob")
     assert 0 < len(scene.is_open) < len(scene.scans)
     assert sum(s.is_false for s in outcome_of("vase with a knob").scans) == len(scene.is_open)
@@ -138,12 +133,11 @@ def test_strangers_are_wrong_wherever_they_are_placed():
         pairs=(*found.pairs, a_pair(min(first, name), max(first, name))),
     )
     before, after = (outcome_of("mirrored scan", each) for each in (found, placed))
-    assert floor_of([before], "of another object").is_met
-    assert floor_of([after], "of another object").is_met is False
+    assert is_met(before, "of another object") and is_met(after, "of another object") is False
     assert [p.is_right for p in after.pairs if p].count(False) == 1
 
 
-def test_two_objects_in_one_component_are_wrong_and_in_two_are_right():
+def test_objects_are_right_in_one_component_each():
     scene = scene_of("two objects")
     one, other = told_as_true(scene, 0), told_as_true(scene, 1)
     scans = {name: found.scans[name] for found in (one, other) for name in found.poses}
@@ -152,9 +146,7 @@ def test_two_objects_in_one_component_are_wrong_and_in_two_are_right():
     assert all(s.is_right for s in outcome_of("two objects", apart).scans)
     mixed = replace(both, components=(one.components[0] + other.components[0],))
     assert sum(s.is_false for s in outcome_of("two objects", mixed).scans) >= 6
-
-
-def test_what_lies_apart_is_not_right():
+    # Nor is what lies apart from its own object right.
     found = told_as_true(scene_of(CLEAN))
     names = found.components[0]
     outcome = outcome_of(CLEAN, replace(found, components=(names[:4], names[4:])))
@@ -174,19 +166,12 @@ def test_a_pair_is_right_within_five_degrees():
         assert pair is not None and pair.is_right is is_right
 
 
-@pytest.mark.parametrize(
-    ("reason", "is_named"),
-    [
-        ("its scale differs: 1.010 times too large", True),
-        ("too large by 1.0 %, its scale is wrong", True),
-        ("scale 0.990", True),
-        ("scale 1.05", False),
-        ("residual 1.010", False),
-    ],
-)
-def test_a_factor_is_named_or_not(reason: str, is_named: bool):
-    scan = ScanOutcome(source="0", world=0, is_open=False, factor=1.01, reason=reason)
-    assert names_factor(scan) is is_named
+def test_a_factor_is_named_or_not():
+    right = ("its scale differs: 1.010 times too large", "too large by 1.0 %, its scale is wrong")
+    reasons = {**dict.fromkeys((*right, "scale 0.990"), True), "scale 1.05": False}
+    for reason, is_named in {**reasons, "residual 1.010": False}.items():
+        scan = ScanOutcome(source="0", world=0, is_open=False, factor=1.01, reason=reason)
+        assert names_factor(scan) is is_named, reason
 
 
 def test_outcomes_come_back_from_their_records():
@@ -221,12 +206,14 @@ def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(Interrupted):
         measured(runs, study)
     made[:] = made[:1]
-    told = []
-    for _ in range(2):
-        outcomes = [Outcome.of(r.unit, r.result) for r in measured(runs, study)]
-        assert made[1:] == [FIRST_FRESH + 3, FIRST_FRESH + 4]
-        told.append((scenario_table(outcomes), floors(outcomes)))
-    assert told[0] == told[1] and f"| {CLEAN} | clean | 5 |" in told[0][0]
+    first, again = ([Outcome.of(r.unit, r.result) for r in measured(runs, study)] for _ in "ab")
+    assert made[1:] == [FIRST_FRESH + 3, FIRST_FRESH + 4] and len(first) == 5
+    assert [o.record() for o in first] == [o.record() for o in again]
+    assert f"| {CLEAN} | clean | 5 |" in told("trust-scenarios", *first)
+    units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
+    seeds = (FIRST_FRESH, FIRST_FRESH + 1)
+    assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]
+    assert len(Runs().units(False)) == sum(scenario.seeds for scenario in SCENARIOS.values()) >= 300
 
 
 @pytest.mark.parametrize(
@@ -242,9 +229,8 @@ def test_failed_runs_are_kept_as_such(
     monkeypatch.setattr(trial, "make_scene", lambda *_: scene_of(CLEAN))
     outcome = try_out(CLEAN, 1)
     assert outcome.verdict == verdict and len(outcome.pairs) == 15
-    assert floor_of([outcome], "crash").is_met is (verdict != "crash")
-    assert floor_of([outcome], "clean").is_met is False
-    assert f"**{verdict}**" in misses(outcome)
+    assert is_met(outcome, "crash") is (verdict != "crash") and is_met(outcome, "clean") is False
+    assert f"**{verdict}**" in told("trust-misses", outcome)
 
 
 def test_the_worst_condition_is_told():
@@ -257,7 +243,7 @@ def test_the_worst_condition_is_told():
 
 def test_kinds_of_pairs_are_counted_and_a_zero_is_told_with_its_bound():
     """Rates at which 0 of n runs has a chance of 5 % lie just below 3 / n."""
-    table = kind_table([outcome_of(name) for name in (CLEAN, "box")])
+    table = told("trust-kinds", outcome_of(CLEAN), outcome_of("box"))
     assert "| good | 25 | 15 | 25 | 10 | 10 |" in table
     assert "| no overlap | 0 | 0 | 0 | 0 | 0 |" in table
     for count in (8, 40, 300):
@@ -266,8 +252,8 @@ def test_kinds_of_pairs_are_counted_and_a_zero_is_told_with_its_bound():
         assert 0.01 < (1 - rate) ** count < 0.05
     assert bound(3) == "too few runs for a bound"
     outcomes = [replace(outcome_of(CLEAN), seed=seed) for seed in range(30)]
-    assert "(< 10 % of runs)" in floor_of(outcomes, "called good that are wrong").reached
-    assert "| 450 | 0 (< 10 % of runs) |" in kind_table(outcomes)
+    assert "(< 10 % of runs)" in floor_of(outcomes, FALSE).reached
+    assert "| 450 | 0 (< 10 % of runs) |" in told("trust-kinds", *outcomes)
     crashed = [*outcomes, replace(outcomes[0], verdict="crash")]
     assert floor_of(crashed, "crash").reached == "1 of 31"
 
@@ -305,10 +291,10 @@ def test_other_tools_are_judged_by_their_own_scores():
     unit = {"scenario": CLEAN, "seed": 1}
     record = Record(unit=unit, result={"fpfh": answers, "kiss": [None] * 15})
     other = Record(unit={"scenario": "hand", "seed": 1}, result=record.result)
-    told = other_tools.answers_by_tool([record, other], [true])
-    assert [len(told[name]) for name in ("own", "fpfh", "kiss")] == [15, 14, 0]
-    assert told["fpfh"].sure == pytest.approx(0.5)
-    table = rendered("trust-rivals", tools=told, titles=other_tools.TITLES)
+    tools = other_tools.answers_by_tool([record, other], [true])
+    assert [len(tools[name]) for name in ("own", "fpfh", "kiss")] == [15, 14, 0]
+    assert tools["fpfh"].sure == pytest.approx(0.5)
+    table = rendered("trust-rivals", tools=tools, titles=other_tools.TITLES)
     assert "| 14 | 2 | 0.958 | 50 |" in table
 
 
@@ -316,16 +302,3 @@ def test_the_page_is_that_of_the_results_and_says_what_was_not_measured(tmp_path
     text = (DOCS / "trust.md").read_text(encoding="utf-8")
     assert page_text(text, Results(DOCS)) == text, "run python -m benchmarks.trust --pages"
     assert page_text(text, Results(tmp_path)).count("Not measured yet.") == 8
-
-
-def test_every_floor_has_a_measure_of_its_own():
-    names = [floor.measure for floor in floors([])]
-    assert len(names) == len(set(names)) == 10
-    assert floor_of([outcome_of(CLEAN)], "AUC").asked == ">= 0.99"
-
-
-def test_units_are_those_asked_for():
-    units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
-    seeds = (FIRST_FRESH, FIRST_FRESH + 1)
-    assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]
-    assert len(Runs().units(False)) == sum(scenario.seeds for scenario in SCENARIOS.values()) >= 300
