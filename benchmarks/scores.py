@@ -1,8 +1,9 @@
-"""How well what is stated of answers tells right from wrong, and whether it comes true."""
+"""How well what is stated of answers tells right from wrong, in numbers and pictures."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from scipy.stats import mannwhitneyu
@@ -10,6 +11,7 @@ from scipy.stats import mannwhitneyu
 from scanweld.geometry.arrays import BoolArray, FloatArray
 
 NUM_BINS = 12
+COLORS = {"pairs": "#1B6CA8", "placed scans": "#C2274B"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,3 +99,38 @@ def bound(num_runs: int) -> str:
     Scans of one run fail together, so that runs count and not scans.
     """
     return f"< {300 / num_runs:.2g} % of runs" if num_runs > 3 else "too few runs for a bound"
+
+
+def draw(stated: Mapping[str, Stated], folder: Path, name: str) -> None:
+    """Draw the reliability diagram and the risk-coverage curve of what ``COLORS`` names."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(5.2, 4.6))
+    axes.plot([0, 1], [0, 1], color="#8C929C", linewidth=1, linestyle="--")
+    for label, each in stated.items():
+        x, y = zip(*((b.confidence, b.right) for b in each.bins()), strict=True)
+        style = {"color": COLORS[label], "marker": "o", "markersize": 4.5}
+        axes.plot(x, y, label=f"{label} ({len(each)})", **style)
+    axes.set(xlabel="confidence that is stated", ylabel="share that is right")
+    axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
+    _save(figure, axes, folder / f"{name}-reliability.png")
+
+    figure, axes = pyplot.subplots(figsize=(6.4, 4.2))
+    for label, each in stated.items():
+        coverage, risk = each.risk_coverage()
+        axes.step(100 * coverage, 100 * risk, where="post", color=COLORS[label], label=label)
+    axes.set(xlabel="taken, the most confident first (%)", ylabel="wrong among these (%)")
+    axes.set(xlim=(0, 101), ylim=(-1, None))
+    _save(figure, axes, folder / f"{name}-risk.png")
+    pyplot.close("all")
+
+
+def _save(figure: Any, axes: Any, path: Path) -> None:
+    axes.grid(color="#E4E6EA", linewidth=0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)

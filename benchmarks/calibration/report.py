@@ -8,9 +8,8 @@ import numpy as np
 
 from benchmarks.calibration.fit import Examples, held_out_probabilities
 from benchmarks.calibration.learn import Learned
-from benchmarks.judging.plots import draw
 from benchmarks.results import Json, how_measured, machine, rounded, write_file
-from benchmarks.scores import Stated
+from benchmarks.scores import Stated, draw
 
 LEAST = (0.5, 0.8, 0.9, 0.95, 0.98)
 """Confidences from which on it is told how many of the right poses are left, and how many wrong."""

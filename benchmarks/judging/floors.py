@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from benchmarks.judging import outcomes as of
+from benchmarks.judging import outcomes as judged
 from benchmarks.judging.outcomes import Outcome, ScanOutcome, determined, share
 from benchmarks.scores import bound
 from benchmarks.sets import SETS
@@ -31,7 +31,7 @@ class Floor(NamedTuple):
 
 def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
     """All floors but those of the real sets."""
-    scans = of.scans_of(outcomes)
+    scans = judged.scans_of(outcomes)
     good = [scan for scan in scans if scan.is_good]
     strangers = [scan for scan in scans if scan.is_stranger]
     return [
@@ -53,7 +53,7 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
         *_confidence(outcomes),
         _none(
             "runs that crash",
-            {f"of {len(outcomes)}": sum(o.verdict == of.CRASH for o in outcomes)},
+            {f"of {len(outcomes)}": sum(o.verdict == judged.CRASH for o in outcomes)},
             outcomes,
         ),
     ]
@@ -78,15 +78,15 @@ def names_factor(scan: ScanOutcome) -> bool:
 
 def _none(measure: str, counts: Mapping[str, int], runs: Sequence[Outcome]) -> Floor:
     """Something that must not happen in any of these runs; beside a zero stands its bound."""
-    told = ", ".join(f"{count} {of_what}" for of_what, count in counts.items())
+    told = ", ".join(f"{count} {of}" for of, count in counts.items())
     is_met = not any(counts.values())
     return Floor(measure, "0", told + (f" ({bound(len(runs))})" if is_met and runs else ""), is_met)
 
 
 def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     """Poses that are asserted although several explain what the scans show."""
-    scans = [scan for scan in of.scans_of(outcomes) if scan.is_open]
-    pairs = [pair for pair in of.posed_pairs(outcomes) if pair.is_open]
+    scans = [scan for scan in judged.scans_of(outcomes) if scan.is_open]
+    pairs = [pair for pair in judged.posed_pairs(outcomes) if pair.is_open]
     counts = {
         f"of {len(some)} {name}": sum((each.confidence or 0.0) > ASSERTED for each in some)
         for name, some in (("scans", scans), ("pairs", pairs))
@@ -125,7 +125,7 @@ def _worst(outcomes: Sequence[Outcome], group: Group, floor: float, told: str) -
 
 
 def _confidence(outcomes: Sequence[Outcome]) -> list[Floor]:
-    pairs = of.stated_pairs(outcomes)
+    pairs = judged.stated_pairs(outcomes)
     area, error, is_any = pairs.auc, pairs.calibration_error(), len(pairs) > 0
     told = f"{area:.4f} of {len(pairs)} pairs, {pairs.num_right} right"
     auc, ece = "confidence of pairs, right against wrong: AUC", "expected calibration error"

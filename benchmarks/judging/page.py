@@ -8,23 +8,13 @@ from statistics import median
 
 from benchmarks import blocks
 from benchmarks.calibration.report import calibration_told
+from benchmarks.judging import outcomes as judged
 from benchmarks.judging.floors import Floor, floors, real_sets
 from benchmarks.judging.other_tools import TITLES, answers_by_tool
-from benchmarks.judging.outcomes import (
-    CRASH,
-    ERROR,
-    Outcome,
-    determined,
-    posed_pairs,
-    scans_of,
-    share,
-    stated_pairs,
-    stated_scans,
-)
-from benchmarks.judging.plots import draw
+from benchmarks.judging.outcomes import CRASH, ERROR, Outcome, determined, scans_of, share
 from benchmarks.kept import read_records
 from benchmarks.results import Json, how_measured, read_results, write_file
-from benchmarks.scores import bound
+from benchmarks.scores import bound, draw
 from benchmarks.seeds import spent_among
 from benchmarks.virtual.scene import Group
 from scanweld.pairs.result import PairKind
@@ -74,7 +64,7 @@ def write_page(folder: Path) -> None:
     """Draw its pictures, and write the measured parts of the folder's page anew."""
     results = Results(folder)
     if (folder / "data/trust.json").exists():
-        stated = stated_pairs(results.outcomes), stated_scans(results.outcomes)
+        stated = judged.stated_pairs(results.outcomes), judged.stated_scans(results.outcomes)
         draw(dict(zip(("pairs", "placed scans"), stated, strict=True)), folder, "trust")
     page = folder / PAGE
     write_file(page, page_text(page.read_text(encoding="utf-8"), results))
@@ -102,10 +92,10 @@ def by_kind(outcomes: Sequence[Outcome]) -> Json:
     """What two scans alone say, and how often they are right; pairs without a pose left out."""
     kinds = []
     for kind in PairKind:
-        of = [pair for pair in posed_pairs(outcomes) if pair.kind is kind]
+        of = [pair for pair in judged.posed_pairs(outcomes) if pair.kind is kind]
         accepted = [pair for pair in of if pair.is_accepted]
         runs = sum(
-            any(p.is_accepted and p.kind is kind for p in posed_pairs([o])) for o in outcomes
+            any(p.is_accepted and p.kind is kind for p in judged.posed_pairs([o])) for o in outcomes
         )
         kinds.append({"kind": str(kind), "pairs": of, "accepted": accepted, "num_runs": runs})
     return {"kinds": kinds, "bound": bound}
@@ -152,7 +142,10 @@ BLOCKS: dict[str, Callable[[Results], Json]] = {
     "trust-floors": _floors,
     "trust-scenarios": lambda results: by_scenario(results.outcomes),
     "trust-confidence": lambda results: {
-        "stated": {"pairs": stated_pairs(results.outcomes), "scans": stated_scans(results.outcomes)}
+        "stated": {
+            "pairs": judged.stated_pairs(results.outcomes),
+            "scans": judged.stated_scans(results.outcomes),
+        }
     },
     "trust-rivals": _tools,
     "trust-kinds": lambda results: by_kind(results.outcomes),

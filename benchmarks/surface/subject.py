@@ -6,16 +6,17 @@ from dataclasses import asdict, dataclass, replace
 from functools import reduce
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from benchmarks.results import Json
 from benchmarks.surface.open3d_fusion import Shape, poisson, shape_of, tsdf
 from benchmarks.surface.surface_defects import surface_defects
-from benchmarks.surface.surface_fit import fit_surface
 from benchmarks.virtual.bodies import joined
 from scanweld.config import FusionConfig
 from scanweld.evaluation.surface_errors import sample_surface, surface_distances
 from scanweld.fusion import fuse, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.gauss_newton import damped, jacobian, motion_of, spread_of, tukey_weights
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
@@ -24,6 +25,9 @@ from scanweld.geometry.scan import RangeScan
 
 COMMON_RESOLUTIONS = 2.0
 """Where every surface has something within this, they are compared."""
+_NUM_ROUNDS = 30
+_STILL = 1e-7
+"""Steps shorter than this share of the reference's extent have arrived."""
 Rival = Callable[[Sequence[Shape], float], TriangleMesh]
 RIVALS: Mapping[str, Rival] = {"Open3D TSDF": tsdf, "Open3D Poisson": poisson}
 
@@ -52,7 +56,7 @@ class Subject:
 
     def distances(self, mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
         """Of the model from the reference, and of what was seen from the model; after one ICP."""
-        pose = fit_surface(mesh, self.reference, num_samples=self.num_samples // 2)
+        pose = _fit_surface(mesh, self.reference, num_samples=self.num_samples // 2)
         moved = replace(mesh, vertices=pose.apply(mesh.vertices))
         points, _ = sample_surface(moved, self.num_samples, np.random.default_rng(0))
         return surface_distances(points, self.reference), surface_distances(self.seen, moved)
@@ -118,6 +122,29 @@ def _single(subject: Subject, meshes: Sequence[TriangleMesh]) -> tuple[FloatArra
     middle, covered = np.full(len(subject.seen), np.inf), covers.any(axis=0)
     middle[covered] = np.nanmedian(np.where(covers, from_seen, np.nan)[:, covered], axis=0)
     return np.concatenate(accuracies), middle
+
+
+def _fit_surface(model: TriangleMesh, reference: TriangleMesh, *, num_samples: int) -> Pose:
+    """Point-to-plane ICP of samples of a model that lies nearly right: reference_from_model."""
+    rng = np.random.default_rng(0)
+    moving, _ = sample_surface(model, num_samples, rng)
+    target, face_of = sample_surface(reference, num_samples, rng)
+    normals = face_normals(reference.vertices, reference.faces)[face_of]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    centre, tree, pose = target.mean(axis=0), KDTree(target), Pose.identity()
+    arm = float(np.linalg.norm(np.ptp(target, axis=0)))
+    for _ in range(_NUM_ROUNDS):
+        points = pose.apply(moving)
+        nearest = tree.query(points)[1]
+        residuals = np.einsum("nk,nk->n", points - target[nearest], normals[nearest])
+        weights = tukey_weights(residuals, spread_of(residuals, 1e-9 * arm))
+        rows = jacobian(points, normals[nearest], centre, arm)
+        normal = damped(rows.T @ (weights[:, None] * rows))
+        twist = -np.linalg.solve(normal, rows.T @ (weights * residuals))
+        pose = motion_of(twist, centre, arm) @ pose
+        if float(np.linalg.norm(twist)) < _STILL * arm:
+            break
+    return pose
 
 
 def seen_of(
