@@ -12,43 +12,32 @@ percent. Overlaps are those of the data's overlaps.csv.
 """
 
 import argparse
-import csv
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from itertools import combinations, pairwise, product
+from itertools import pairwise, product
 from pathlib import Path
 from statistics import mean
-from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.blocks import rendered
 from benchmarks.results import Json, write_results
 from benchmarks.scores import Stated
-from benchmarks.sets import BUNNY, data_folder, dragon, moved_scans
-from benchmarks.virtual.bodies import make_body
-from benchmarks.virtual.shots import SLIGHT, ring, shot_overlaps, take_shots
+from benchmarks.sets import OBJECTS, PairSet, data_folder, made_pairs, moved_scans, real_pairs
 from scanweld.config import Config, PairsConfig
 from scanweld.contours.coherence import contour_matcher
 from scanweld.evaluation.metrics import MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT, object_diameter
 from scanweld.evidence.field import make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.geometry.scan import RangeScan
 from scanweld.heat.features import describe
-from scanweld.io import read_poses, read_scan
 from scanweld.pairs.registrar import pair_registrar
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
 
-OBJECTS = {
-    "bunny": ("stanford-bunny", BUNNY, 360.0),
-    "dragon": ("stanford-dragon", dragon(24), 97.0),
-}
-"""Object -> folder, scans, largest rotation between the scans of a pair in degrees."""
 KEYPOINTS = ("mixed", "heat", "even")
 NEAR_ROTATION_DEG, NEAR_TRANSLATION_PERCENT = 10.0, 5.0
 FLOORS = {(0.15, 1.01): 0.95, (0.10, 0.15): 0.80, (0.05, 0.10): None, (0.0, 0.05): None}
@@ -56,15 +45,6 @@ FLOORS = {(0.15, 1.01): 0.95, (0.10, 0.15): 0.80, (0.05, 0.10): None, (0.0, 0.05
 MIN_AUC = 0.97
 WIDE, THIN = (0.10, np.inf), (0.05, 0.10)
 """Overlaps of the pairs that pages tell of in words."""
-
-
-class Scans(NamedTuple):
-    """Scans of an object, their true poses, and the pairs that are asked for."""
-
-    name: str
-    scans: list[RangeScan]
-    world_from_scan: Mapping[str, Pose]
-    pairs: Mapping[tuple[str, str], tuple[float, float]]  # Overlap, and rotation in degrees
 
 
 def main() -> int:
@@ -81,7 +61,7 @@ def main() -> int:
     add("--plot", type=Path, help="PNG file, of the last kind of keypoints")
     options = parser.parse_args()
     data = data_folder(options.data)
-    objects = [made_scans()] if options.quick else [real_scans(n, data) for n in options.objects]
+    objects = [made_pairs()] if options.quick else [real_pairs(n, data) for n in options.objects]
     answers: list[Json] = []
     for anchors, scans, seed in product(options.keypoints, objects, range(options.seeds)):
         print(f"{anchors}, {scans.name} seed {seed}", file=sys.stderr, flush=True)
@@ -94,36 +74,7 @@ def main() -> int:
     return 0 if options.quick or are_floors_met(answers) else 1
 
 
-def real_scans(name: str, data: Path) -> Scans:
-    """Of an object of the data."""
-    folder, names, max_gap_deg = OBJECTS[name]
-    with (data / folder / "overlaps.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    pairs = {
-        (row["i"], row["j"]): (min(float(row["overlap_ij"]), float(row["overlap_ji"])), gap)
-        for row in rows
-        if (gap := float(row["rotation_deg"])) <= max_gap_deg
-    }
-    scans = [read_scan(data / folder / f"{name}.ply") for name in names]
-    poses = read_poses(data / folder / "poses.json").poses
-    return Scans(name=name, scans=scans, world_from_scan=poses, pairs=pairs)
-
-
-def made_scans() -> Scans:
-    """Three of a made object, without the data."""
-    body = make_body("thing", 0)
-    views = ring(body, np.random.default_rng(0), count=3, step_deg=40.0, pixels=(120.0,))
-    shots = take_shots(body, views, SLIGHT, 0)
-    overlaps, poses = shot_overlaps(shots), {shot.scan.name: shot.pose for shot in shots}
-    pairs = {
-        (f"{i}", f"{j}"): (float(overlaps[i, j]), 40.0 * (j - i))
-        for i, j in combinations(range(len(shots)), 2)
-    }
-    scans = [shot.scan for shot in shots]
-    return Scans(name="made", scans=scans, world_from_scan=poses, pairs=pairs)
-
-
-def answers_of(scans: Scans, seed: int, anchors: str, workers: int) -> list[Json]:
+def answers_of(scans: PairSet, seed: int, anchors: str, workers: int) -> list[Json]:
     """Register all pairs of an object, its scans moved as the seed says.
 
     An answer has the anchors that its hypotheses hung on, the pair, the errors, score and evidence

@@ -1,13 +1,17 @@
 """The benchmark's sets: real scans renamed, shuffled and moved, or simulated, with their truth."""
 
+import csv
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.virtual.bodies import make_body
+from benchmarks.virtual.shots import SLIGHT, ring, shot_overlaps, take_shots
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.metrics import object_diameter, scan_centroids
 from scanweld.evaluation.simulate import simulate
@@ -84,6 +88,13 @@ QUICK: Mapping[str, BenchmarkSet] = {
 """Needs no data."""
 
 
+OBJECTS = {
+    "bunny": ("stanford-bunny", BUNNY, 360.0),
+    "dragon": ("stanford-dragon", dragon(24), 97.0),
+}
+"""Object -> folder, scans, largest rotation between the scans of a pair in degrees."""
+
+
 class Truth(NamedTuple):
     """What a made set is held against."""
 
@@ -155,3 +166,41 @@ def moved_scans(
         moved.append(RangeScan(points=motion.apply(scan.points), grid=grid, **kept))
         poses[scan.name] = world_from_scan[scan.name] @ motion.inverse()
     return moved, poses
+
+
+class PairSet(NamedTuple):
+    """Scans of an object, their true poses, and the pairs that are asked for."""
+
+    name: str
+    scans: list[RangeScan]
+    world_from_scan: Mapping[str, Pose]
+    pairs: Mapping[tuple[str, str], tuple[float, float]]  # Overlap, and rotation in degrees
+
+
+def real_pairs(name: str, data: Path) -> PairSet:
+    """Of an object of the data."""
+    folder, names, max_gap_deg = OBJECTS[name]
+    with (data / folder / "overlaps.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    pairs = {
+        (row["i"], row["j"]): (min(float(row["overlap_ij"]), float(row["overlap_ji"])), gap)
+        for row in rows
+        if (gap := float(row["rotation_deg"])) <= max_gap_deg
+    }
+    scans = [read_scan(data / folder / f"{name}.ply") for name in names]
+    poses = read_poses(data / folder / "poses.json").poses
+    return PairSet(name=name, scans=scans, world_from_scan=poses, pairs=pairs)
+
+
+def made_pairs() -> PairSet:
+    """Three of a made object, without the data."""
+    body = make_body("thing", 0)
+    views = ring(body, np.random.default_rng(0), count=3, step_deg=40.0, pixels=(120.0,))
+    shots = take_shots(body, views, SLIGHT, 0)
+    overlaps, poses = shot_overlaps(shots), {shot.scan.name: shot.pose for shot in shots}
+    pairs = {
+        (f"{i}", f"{j}"): (float(overlaps[i, j]), 40.0 * (j - i))
+        for i, j in combinations(range(len(shots)), 2)
+    }
+    scans = [shot.scan for shot in shots]
+    return PairSet(name="made", scans=scans, world_from_scan=poses, pairs=pairs)
