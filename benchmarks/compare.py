@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean, stdev
 
-from benchmarks.blocks import markdown_table
+from benchmarks.blocks import rendered
 from benchmarks.results import read_results
 from benchmarks.run import COLUMNS
 
-METRICS = ("right", "wrong", *(key for key, *_ in COLUMNS))
+METRICS = ("right", "wrong", *(column.key for column in COLUMNS))
 
 
 def main() -> int:
@@ -22,12 +22,12 @@ def main() -> int:
         return 2
     documents = (read_results(Path(argument)) for argument in sys.argv[1:])
     a, b = ({(r["set"], r["seed"]): r for r in document["records"]} for document in documents)
-    rows = []
+    rows = {}
     for name in dict.fromkeys(name for name, _ in a):
         both = [key for key in a if key[0] == name and key in b]
         told = [difference([(a[key].get(m), b[key].get(m)) for key in both]) for m in METRICS]
-        rows.append((name, len(both), *told))
-    print(markdown_table(("set", "runs", *METRICS), rows), end="")
+        rows[name] = [len(both), *told]
+    print(rendered("compare", metrics=METRICS, rows=rows), end="")
     return 0
 
 

@@ -11,13 +11,13 @@ at 8 is the share of repeated keypoints whose partner is among the 8 nearest sig
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
+from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.blocks import markdown_table
+from benchmarks.blocks import rendered
 from benchmarks.results import Json, write_results
 from benchmarks.sets import data_folder
 from scanweld.config import HeatConfig, PrepareConfig
@@ -37,18 +37,10 @@ AZIMUTHS_DEG = (0, 90, 180, 270)
 ELEVATION_DEG = 10
 RADIUS_DIAMETERS = 0.03
 NEAREST = 8
-COLUMNS = {
-    "keypoints": "keypoints",
-    "repeated": "repeated",
-    "repeated_chance": "chance",
-    "recall": "recall at 8",
-    "recall_chance": "chance",
-    "seconds": "seconds",
-}
+COLUMNS = ("keypoints", "repeated", "repeated_chance", "recall", "recall_chance", "seconds")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Seen:
+class Seen(NamedTuple):
     """A described view."""
 
     world_from_sensor: Pose
@@ -73,7 +65,7 @@ def main() -> None:
         compared = [c for p in paths for c in comparisons(p.stem, read_mesh(p), options.up)]
     if options.out:
         write_results(options.out, compared)
-    print(table(compared), end="")
+    print(rendered("keypoints", **over_views(compared)), end="")
 
 
 def comparisons(
@@ -89,21 +81,21 @@ def comparisons(
         first = look(mesh, azimuth, up)
         for gap in gaps_deg:
             second = look(mesh, azimuth + gap, up)
+            of = {"mesh": name, "azimuth": azimuth, "gap": gap}
             for i, j in ((first, second), (second, first)):
                 cost = {"keypoints": len(j.features.points), "seconds": second.seconds}
-                of = {"mesh": name, "azimuth": azimuth, "gap": gap}
                 found.append({**of, **compare(i, j), **cost})
     return found
 
 
-def table(compared: Sequence[Json]) -> str:
-    """Markdown: means for each mesh and gap."""
-    rows = []
+def over_views(compared: Sequence[Json]) -> Json:
+    """Means of the columns for each mesh and gap; None where nothing is known."""
+    views = []
     for mesh, gap in dict.fromkeys((c["mesh"], c["gap"]) for c in compared):
         of = [c for c in compared if (c["mesh"], c["gap"]) == (mesh, gap)]
         known = ([c[key] for c in of if c[key] is not None] for key in COLUMNS)
-        rows.append((mesh, gap, *(f"{mean(values):.2f}" if values else "-" for values in known)))
-    return markdown_table(("mesh", "gap (deg)", *COLUMNS.values()), rows)
+        views.append((mesh, gap, [mean(values) if values else None for values in known]))
+    return {"views": views}
 
 
 def look(mesh: TriangleMesh, azimuth_deg: float, up: Axis) -> Seen:
@@ -113,36 +105,34 @@ def look(mesh: TriangleMesh, azimuth_deg: float, up: Axis) -> Seen:
     scan = prepare(scan_mesh(mesh, view.camera, pose), PrepareConfig())
     start = time.perf_counter()
     features = describe(scan, HeatConfig())
-    seconds = time.perf_counter() - start
-    return Seen(world_from_sensor=pose, scan=scan, features=features, seconds=seconds)
+    return Seen(pose, scan, features, time.perf_counter() - start)
 
 
 def compare(i: Seen, j: Seen) -> dict[str, float | None]:
     """Repeatability of i's keypoints in j and recall at 8, each with its chance level."""
     j_from_i = j.world_from_sensor.inverse() @ i.world_from_sensor
-    points = j_from_i.apply(i.features.points)
-    samples = j_from_i.apply(i.scan.samples.points)
-    samples = samples[is_seen(samples, j.scan)]
-    is_near = near(points, j) & is_seen(points, j.scan)[:, None]
+    points, samples = (j_from_i.apply(p) for p in (i.features.points, i.scan.samples.points))
+    samples = samples[_is_seen(samples, j.scan)]
+    is_near = _near(points, j) & _is_seen(points, j.scan)[:, None]
     repeated: BoolArray = np.any(is_near, axis=1)
     apart = np.linalg.norm(i.features.signatures[:, None] - j.features.signatures[None], axis=-1)
     among = np.argsort(apart, axis=1, kind="stable")[:, :NEAREST]
     is_found: BoolArray = np.any(np.take_along_axis(is_near, among, axis=1), axis=1)
     return {
-        "repeated": float(repeated.sum() / is_seen(points, j.scan).sum()),
-        "repeated_chance": float(np.mean(near(samples, j).any(axis=1))),
+        "repeated": float(repeated.sum() / _is_seen(points, j.scan).sum()),
+        "repeated_chance": float(np.mean(_near(samples, j).any(axis=1))),
         "recall": float(np.mean(is_found[repeated])) if repeated.any() else None,
         "recall_chance": NEAREST / len(j.features.points),
     }
 
 
-def near(points: FloatArray, seen: Seen) -> BoolArray:
+def _near(points: FloatArray, seen: Seen) -> BoolArray:
     """Which of a view's M keypoints are near which points (N, 3), sensor frame: (N, M)."""
     away = np.linalg.norm(points[:, None] - seen.features.points[None], axis=-1)
     return away < RADIUS_DIAMETERS * seen.scan.diameter
 
 
-def is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
+def _is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
     """Which points (N, 3), sensor frame, lie on the surface that the scan shows."""
     pixels, depth = scan.image.camera.project(points)
     columns, rows = np.rint(pixels).astype(int).T

@@ -24,11 +24,8 @@ Json = dict[str, Any]
 def write_results(path: Path, records: Sequence[Json]) -> None:
     """Write records, floats to a few significant digits, beside how they came about."""
     head = {
-        "format": 2,
-        "command": command_line(f"benchmarks.{Path(sys.argv[0]).stem}"),
-        "commit": commit(),
-        "version": version("scanweld"),
-        "machine": machine(),
+        **{"format": 2, "command": command_line(f"benchmarks.{Path(sys.argv[0]).stem}")},
+        **{"commit": commit(), "version": version("scanweld"), "machine": machine()},
     }
     lines = ",\n".join(json.dumps(rounded(record, 6)) for record in records)
     write_file(path, f'{json.dumps(head, indent=1)[:-2]},\n "records": [\n{lines}\n]}}\n')
@@ -76,6 +73,4 @@ def rounded(value: Any, digits: int) -> Any:
         return float(f"{value:.{digits}g}")
     if isinstance(value, Mapping):
         return {key: rounded(item, digits) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [rounded(item, digits) for item in value]
-    return value
+    return [rounded(item, digits) for item in value] if isinstance(value, list | tuple) else value

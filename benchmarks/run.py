@@ -18,43 +18,66 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
-from benchmarks.blocks import judged, markdown_table
+from benchmarks.blocks import rendered
 from benchmarks.kept import warn_of_old_calibration
 from benchmarks.results import Json, write_results
-from benchmarks.sets import QUICK, SETS, BenchmarkSet, data_folder, make_set
-from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
+from benchmarks.sets import QUICK, SETS, data_folder, make_set
+from scanweld.evaluation.metrics import Standing, evaluate_poses
 from scanweld.io import PoseSet, read_poses
 
 ALL = {**SETS, **QUICK}
+
+
+class Column(NamedTuple):
+    """A value of a run that has a column in the table."""
+
+    key: str  # Of the run, and of the floors
+    heading: str
+    together: Callable[[list[float]], float]  # How seeds are put together
+    digits: int
+
+
 COLUMNS = (
-    ("rotation_mean", "rotation mean (deg)", median, 3),
-    ("rotation_max", "rotation max (deg)", max, 3),
-    ("translation_mean", "translation mean (%)", median, 3),
-    ("translation_max", "translation max (%)", max, 3),
-    ("seconds", "wall (s)", median, 1),
-    ("cpu_seconds", "CPU (s)", median, 1),
-    ("peak_mb", "peak (MB)", max, 0),
+    Column("rotation_mean", "rotation mean (deg)", median, 3),
+    Column("rotation_max", "rotation max (deg)", max, 3),
+    Column("translation_mean", "translation mean (%)", median, 3),
+    Column("translation_max", "translation max (%)", max, 3),
+    Column("seconds", "wall (s)", median, 1),
+    Column("cpu_seconds", "CPU (s)", median, 1),
+    Column("peak_mb", "peak (MB)", max, 0),
 )
-"""Key of a run and of the floors, heading, how seeds are put together, digits."""
 
 
 def main() -> int:
     """Run the sets; 0 if all floors are met, else 1."""
-    options = _options()
+    parser = argparse.ArgumentParser(description="Run the main job on sets of scans.")
+    add = parser.add_argument
+    add("--sets", nargs="+", choices=list(ALL), default=list(SETS), metavar="SET")
+    add("--seeds", type=int, default=3, help="number of orders, names and frames")
+    add("--quick", action="store_true", help="one small set that needs no data")
+    add("--workers", type=int, default=2)
+    add("--data", type=Path, help="folder of the Stanford data")
+    add("--out", type=Path, help="JSON file of all runs")
+    add("--keep", type=Path, help="folder for the models of all runs")
+    add("--cold", action="store_true", help="compile anew, as after installation")
+    add("extra", nargs="*", help="further options of scanweld run, after --")
+    options = parser.parse_args()
     warn_of_old_calibration()
     names, seeds = (list(QUICK), 1) if options.quick else (options.sets, options.seeds)
     runs: list[Json] = []
     for name in names:
         for seed in range(seeds):
             runs.append(run_set(name, seed, options))
-            _show_progress(runs[-1])
+            counts = ", ".join(f"{runs[-1][str(standing)]} {standing}" for standing in Standing)
+            print(f"{name} seed {seed}: {counts}", file=sys.stderr, flush=True)
             if options.out:
                 write_results(options.out, runs)
-    print(table(runs), end="")
+    print(rendered("sets", **over_seeds(runs)), end="")
     return 0 if all(ALL[run["set"]].is_met(run) for run in runs) else 1
 
 
@@ -63,7 +86,10 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> Json:
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         folder, out = Path(temporary) / "scans", Path(temporary) / "model"
         truth = make_set(ALL[name], seed, folder, data_folder(options.data))
-        command = [_executable(), "run", str(folder), "-o", str(out), *options.extra]
+        # The command that is installed beside this Python, else the one on the path.
+        beside = Path(sys.executable).with_name("scanweld")
+        scanweld = str(beside) if beside.exists() else "scanweld"
+        command = [scanweld, "run", str(folder), "-o", str(out), *options.extra]
         environment = dict(os.environ)
         if options.cold:
             environment["NUMBA_CACHE_DIR"] = str(Path(temporary) / "compiled")
@@ -75,20 +101,22 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> Json:
         if options.keep and out.exists():
             shutil.copytree(out, options.keep / f"{name}-{seed}", dirs_exist_ok=True)
     errors = evaluate_poses(found, truth.poses, centroids=truth.centroids, diameter=truth.diameter)
+    measured = {"rotation": errors.rotations_deg, "translation": errors.translations_percent}
     return {
-        "set": name,
-        "seed": seed,
-        "verdict": report.get("verdict", "error"),
+        **{"set": name, "seed": seed, "verdict": report.get("verdict", "error")},
         **usage,
         "stages": report.get("stages", {}),
-        **summary(errors),
+        **{str(standing): errors.count(standing) for standing in Standing},
+        # Of the placed scans; None if there are none.
+        **{f"{k}_mean": float(v.mean()) if len(v) else None for k, v in measured.items()},
+        **{f"{k}_max": float(v.max()) if len(v) else None for k, v in measured.items()},
         "scans": {
-            truth.originals[name]: {
+            truth.originals[scan]: {
                 "standing": str(error.standing),
                 "rotation_deg": error.rotation_deg,
                 "translation_percent": 100.0 * error.translation / truth.diameter,
             }
-            for name, error in sorted(errors.scans.items())
+            for scan, error in sorted(errors.scans.items())
             if error.standing is not Standing.UNPLACED
         },
     }
@@ -112,65 +140,21 @@ def timed(command: list[str], environment: dict[str, str]) -> dict[str, float]:
     }
 
 
-def summary(errors: PoseErrors) -> Json:
-    """Counts, and mean and largest errors of the placed scans (None if there are none)."""
-    counts: Json = {str(standing): errors.count(standing) for standing in Standing}
-    measured = {"rotation": errors.rotations_deg, "translation": errors.translations_percent}
-    for name, values in measured.items():
-        counts[f"{name}_mean"] = float(values.mean()) if len(values) else None
-        counts[f"{name}_max"] = float(values.max()) if len(values) else None
-    return counts
+def over_seeds(runs: Sequence[Json]) -> Json:
+    """The sets, what each reached over its seeds, and the columns of the table."""
+    names = dict.fromkeys(run["set"] for run in runs)
+    sets = [_over_seeds(name, [run for run in runs if run["set"] == name]) for name in names]
+    return {"columns": COLUMNS, "sets": sets}
 
 
-def table(runs: Sequence[Json]) -> str:
-    """Markdown, one line a set."""
-    headings = ("set", "seeds", "right", "wrong", *(c[1] for c in COLUMNS), "verdicts")
-    by_set = {name: [r for r in runs if r["set"] == name] for name in {r["set"]: 0 for r in runs}}
-    rows = [(name, len(of), *_cells(of, ALL[name])) for name, of in by_set.items()]
-    return markdown_table(headings, rows)
-
-
-def _cells(runs: Sequence[Json], wanted: BenchmarkSet) -> list[str]:
-    right, wrong = min(run["right"] for run in runs), max(run["wrong"] for run in runs)
-    cells = [
-        judged(f"{right}/{wanted.num_scans}", right >= wanted.num_scans),
-        judged(str(wrong), wrong == 0),
-    ]
-    for key, _, together, digits in COLUMNS:
-        values = [run[key] for run in runs if run[key] is not None]
-        floor = wanted.floors.get(key)
-        text = f"{together(values):.{digits}f}" if values else "-"
-        if floor is None or not values:
-            cells.append(judged(text, floor is None))
-        else:
-            cells.append(judged(f"{text} ({floor:g})", together(values) <= floor))
-    return [*cells, " ".join(sorted({run["verdict"] for run in runs}))]
-
-
-def _executable() -> str:
-    """The command that is installed beside this Python, else the one on the path."""
-    beside = Path(sys.executable).with_name("scanweld")
-    return str(beside) if beside.exists() else "scanweld"
-
-
-def _show_progress(run: Json) -> None:
-    counts = ", ".join(f"{run[str(standing)]} {standing}" for standing in Standing)
-    told = f"{run['set']} seed {run['seed']}: {counts}, {run['verdict']}, {run['seconds']:.1f} s"
-    print(told, file=sys.stderr, flush=True)
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Run the main job on sets of scans.")
-    parser.add_argument("--sets", nargs="+", choices=list(ALL), default=list(SETS), metavar="SET")
-    parser.add_argument("--seeds", type=int, default=3, help="number of orders, names and frames")
-    parser.add_argument("--quick", action="store_true", help="one small set that needs no data")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--data", type=Path, help="folder of the Stanford data")
-    parser.add_argument("--out", type=Path, help="JSON file of all runs")
-    parser.add_argument("--keep", type=Path, help="folder for the models of all runs")
-    parser.add_argument("--cold", action="store_true", help="compile anew, as after installation")
-    parser.add_argument("extra", nargs="*", help="further options of scanweld run, after --")
-    return parser.parse_args()
+def _over_seeds(name: str, runs: Sequence[Json]) -> Json:
+    known = {c: [run[c.key] for run in runs if run[c.key] is not None] for c in COLUMNS}
+    return {
+        **{"name": name, "wanted": ALL[name], "runs": len(runs)},
+        **{"right": min(run["right"] for run in runs), "wrong": max(run["wrong"] for run in runs)},
+        **{c.key: c.together(values) if values else None for c, values in known.items()},
+        "verdicts": sorted({run["verdict"] for run in runs}),
+    }
 
 
 if __name__ == "__main__":

@@ -1,13 +1,17 @@
 """The benchmark's sets: real scans renamed, shuffled and moved, or simulated, with their truth."""
 
+import csv
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.virtual.bodies import make_body
+from benchmarks.virtual.shots import SLIGHT, ring, shot_overlaps, take_shots
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.metrics import object_diameter, scan_centroids
 from scanweld.evaluation.simulate import simulate
@@ -34,8 +38,7 @@ class BenchmarkSet:
 
     folder: str = ""  # Of the data, with a poses.json; empty for the simulated creature
     scans: tuple[str, ...] = ()  # Names of the scans in that folder
-    # Whether files are turned any way, not only about their viewing axis
-    any_rotation: bool = False
+    any_rotation: bool = False  # Whether files are turned not only about their viewing axis
     # Most that each value of a run may be, by its name; errors are in degrees and in percent of the
     # object's diameter. All scans have to be right.
     floors: Mapping[str, float]
@@ -85,8 +88,14 @@ QUICK: Mapping[str, BenchmarkSet] = {
 """Needs no data."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Truth:
+OBJECTS = {
+    "bunny": ("stanford-bunny", BUNNY, 360.0),
+    "dragon": ("stanford-dragon", dragon(24), 97.0),
+}
+"""Object -> folder, scans, largest rotation between the scans of a pair in degrees."""
+
+
+class Truth(NamedTuple):
     """What a made set is held against."""
 
     poses: Mapping[str, Pose]  # Reference world_from_scan by the new names
@@ -103,37 +112,26 @@ def data_folder(given: Path | None) -> Path:
 def make_set(wanted: BenchmarkSet, seed: int, out_dir: Path, data: Path) -> Truth:
     """Write the scans of a set to a folder, in the seed's order, names and frames."""
     if not wanted.folder:
-        truth = simulate(
-            creature(), out_dir, num_scans=wanted.num_simulated, pixels=wanted.pixels, seed=seed
-        ).poses
-        scans = [read_scan(out_dir / f"{name}.ply") for name in truth]
-        return _truth(scans, truth, {name: name for name in truth})
-    source = data / wanted.folder
-    scans = [read_scan(source / f"{name}.ply") for name in wanted.scans]
-    moved, poses = moved_scans(
-        scans, read_poses(source / "poses.json").poses, seed, any_rotation=wanted.any_rotation
-    )
-    order = np.random.default_rng([seed, 1]).permutation(len(moved))
-    named = {f"scan_{number:02d}": moved[k] for number, k in enumerate(order, start=1)}
-    out_dir.mkdir(parents=True, exist_ok=True)
-    for name, scan in named.items():
-        write_scan_ply(out_dir / f"{name}.ply", scan)
-    return _truth(
-        [replace(scan, name=name) for name, scan in named.items()],
-        {name: poses[scan.name] for name, scan in named.items()},
-        {name: scan.name for name, scan in named.items()},
-    )
-
-
-def _truth(
-    scans: list[RangeScan], poses: Mapping[str, Pose], originals: Mapping[str, str]
-) -> Truth:
-    return Truth(
-        poses=poses,
-        originals=originals,
-        centroids=scan_centroids(scans),
-        diameter=object_diameter(scans, poses),
-    )
+        how = {"num_scans": wanted.num_simulated, "pixels": wanted.pixels, "seed": seed}
+        poses = simulate(creature(), out_dir, **how).poses
+        scans = [read_scan(out_dir / f"{name}.ply") for name in poses]
+        originals = {name: name for name in poses}
+    else:
+        source = data / wanted.folder
+        moved, poses = moved_scans(
+            [read_scan(source / f"{name}.ply") for name in wanted.scans],
+            read_poses(source / "poses.json").poses,
+            seed,
+            any_rotation=wanted.any_rotation,
+        )
+        order = np.random.default_rng([seed, 1]).permutation(len(moved))
+        originals = {f"scan_{k:02d}": moved[at].name for k, at in enumerate(order, start=1)}
+        scans = [replace(moved[at], name=name) for name, at in zip(originals, order, strict=True)]
+        poses = {name: poses[original] for name, original in originals.items()}
+        out_dir.mkdir(parents=True, exist_ok=True)
+        for scan in scans:
+            write_scan_ply(out_dir / f"{scan.name}.ply", scan)
+    return Truth(poses, originals, scan_centroids(scans), object_diameter(scans, poses))
 
 
 def moved_scans(
@@ -156,26 +154,53 @@ def moved_scans(
     """
     rng = np.random.default_rng([seed, 0])
     moved: list[RangeScan] = []
+    poses: dict[str, Pose] = {}
     for scan in scans:
         roll = rotation_exp(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))
         reach = 2.0 * principal_diameter(scan.points)
-        motion = Pose(
-            rotation=random_rotation(rng) if any_rotation else roll,
-            translation=rng.uniform(-reach, reach, size=3),
-        )
+        turn = random_rotation(rng) if any_rotation else roll
+        motion = Pose(rotation=turn, translation=rng.uniform(-reach, reach, size=3))
         quarters = int(rng.integers(4)) if turn_grids else 0
+        kept = {"name": scan.name, "colors": scan.colors, "confidence": scan.confidence}
         grid = None if scan.grid is None else np.rot90(scan.grid, quarters)
-        moved.append(
-            RangeScan(
-                name=scan.name,
-                points=motion.apply(scan.points),
-                grid=grid,
-                colors=scan.colors,
-                confidence=scan.confidence,
-            )
-        )
-        world_from_scan = {
-            **world_from_scan,
-            scan.name: world_from_scan[scan.name] @ motion.inverse(),
-        }
-    return moved, {scan.name: world_from_scan[scan.name] for scan in scans}
+        moved.append(RangeScan(points=motion.apply(scan.points), grid=grid, **kept))
+        poses[scan.name] = world_from_scan[scan.name] @ motion.inverse()
+    return moved, poses
+
+
+class PairSet(NamedTuple):
+    """Scans of an object, their true poses, and the pairs that are asked for."""
+
+    name: str
+    scans: list[RangeScan]
+    world_from_scan: Mapping[str, Pose]
+    pairs: Mapping[tuple[str, str], tuple[float, float]]  # Overlap, and rotation in degrees
+
+
+def real_pairs(name: str, data: Path) -> PairSet:
+    """Of an object of the data."""
+    folder, names, max_gap_deg = OBJECTS[name]
+    with (data / folder / "overlaps.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    pairs = {
+        (row["i"], row["j"]): (min(float(row["overlap_ij"]), float(row["overlap_ji"])), gap)
+        for row in rows
+        if (gap := float(row["rotation_deg"])) <= max_gap_deg
+    }
+    scans = [read_scan(data / folder / f"{name}.ply") for name in names]
+    poses = read_poses(data / folder / "poses.json").poses
+    return PairSet(name=name, scans=scans, world_from_scan=poses, pairs=pairs)
+
+
+def made_pairs() -> PairSet:
+    """Three of a made object, without the data."""
+    body = make_body("thing", 0)
+    views = ring(body, np.random.default_rng(0), count=3, step_deg=40.0, pixels=(120.0,))
+    shots = take_shots(body, views, SLIGHT, 0)
+    overlaps, poses = shot_overlaps(shots), {shot.scan.name: shot.pose for shot in shots}
+    pairs = {
+        (f"{i}", f"{j}"): (float(overlaps[i, j]), 40.0 * (j - i))
+        for i, j in combinations(range(len(shots)), 2)
+    }
+    scans = [shot.scan for shot in shots]
+    return PairSet(name="made", scans=scans, world_from_scan=poses, pairs=pairs)

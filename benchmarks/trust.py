@@ -13,34 +13,51 @@ on where it stopped. Change the code that measures and they are made again. 0 if
 import argparse
 import shutil
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.judging.other_tools import OtherTools
-from benchmarks.judging.runs import Runs
+from benchmarks.judging.page import PAGE, Results, block, write_page
+from benchmarks.judging.trial import Runs
 from benchmarks.kept import (
     COMPARED,
     TRUSTED,
-    Study,
     Unit,
+    add_options,
     code_digest,
     measured,
+    study,
     warn_of_old_calibration,
 )
-from benchmarks.results import DOCS, command_line, read_results
+from benchmarks.results import DOCS, read_results
 from benchmarks.seeds import FIRST_FRESH, spent_among
-from benchmarks.trust_page import PAGE, Results, block, write_page
 from benchmarks.virtual.scenarios import SCENARIOS
 from scanweld.errors import InputError
-from scanweld.work.threads import num_workers
+
+PRINTED = ("trust-seeds", "trust-floors", "trust-scenarios", "trust-rivals", "trust-misses")
 
 
 def main() -> int:
     """Make runs, comparison and page; 0 if all floors are met or only the page was asked for."""
-    options = _options()
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.trust",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--only", nargs="+", choices=SCENARIOS, default=tuple(SCENARIOS), metavar="NAME")
+    add("--seeds", type=int, default=10**6, help="of each scenario, at most (default: its own)")
+    add("--first-seed", type=int, default=FIRST_FRESH, help="see benchmarks/SEEDS.md")
+    add("--compare", action="store_true", help="other tools on some pairs too (extra: bench)")
+    add("--pages", action="store_true", help="only write the page anew")
+    options = add_options(parser, "--jobs", "trust").parse_args()
     warn_of_old_calibration()
     if not options.pages:
-        _measure(options)
+        runs = Runs(scenarios=options.only, seeds=options.seeds, first_seed=options.first_seed)
+        refuse_seen_seeds(runs.units(options.quick), options.out)
+        measured(runs, study(options, "trust", TRUSTED), is_written=True)
+        if options.compare:
+            others = OtherTools(first_seed=options.first_seed)
+            measured(others, study(options, "trust", COMPARED), is_written=True)
     for name in (PAGE, "data/sets.json"):
         # Another folder than the documentation's gets a copy of its page and of the real sets.
         if not (options.out / name).exists():
@@ -49,26 +66,8 @@ def main() -> int:
     if options.pages:
         return 0
     results = Results(options.out)
-    for name in ("trust-seeds", "trust-floors", "trust-scenarios", "trust-rivals", "trust-misses"):
-        print(block(name, results))
+    print(*(block(name, results) for name in PRINTED), sep="\n")
     return int(any(floor.is_met is False for floor in results.floors))
-
-
-def _measure(options: argparse.Namespace) -> None:
-    study = Study(
-        out=options.out,
-        work=options.work or options.out.parent / ".trust.work",
-        workers=num_workers(options.jobs),
-        quick=options.quick,
-        command=command_line("benchmarks.trust"),
-        code=TRUSTED,
-    )
-    runs = Runs(scenarios=options.only, seeds=options.seeds, first_seed=options.first_seed)
-    refuse_seen_seeds(runs.units(options.quick), options.out)
-    study.write(runs, measured(runs, study))
-    if options.compare:
-        others, study = OtherTools(first_seed=options.first_seed), replace(study, code=COMPARED)
-        study.write(others, measured(others, study))
 
 
 def refuse_seen_seeds(units: list[Unit], out: Path) -> None:
@@ -88,27 +87,8 @@ def refuse_seen_seeds(units: list[Unit], out: Path) -> None:
     if fresh:
         raise InputError(
             f"seeds {fresh[0]} to {fresh[-1]} were already looked at in {PAGE}: enter them into "
-            "LEDGER of benchmarks/seeds.py and measure fresh ones, see benchmarks/SEEDS.md"
+            "benchmarks/SEEDS.md and measure fresh ones, as it says"
         )
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.trust",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add = parser.add_argument
-    add("--only", nargs="+", choices=SCENARIOS, default=tuple(SCENARIOS), metavar="NAME")
-    add("--seeds", type=int, default=10**6, help="of each scenario, at most (default: its own)")
-    add("--first-seed", type=int, default=FIRST_FRESH, help="see benchmarks/SEEDS.md")
-    add("--quick", action="store_true", help="a handful of runs")
-    add("--compare", action="store_true", help="other tools on some pairs too (extra: bench)")
-    add("--pages", action="store_true", help="only write the page anew")
-    add("--jobs", type=int, help="processes (default: one a core)")
-    add("--out", type=Path, default=DOCS, help="folder of the page (docs)")
-    add("--work", type=Path, help="finished runs (default: .trust.work beside out)")
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from benchmarks.virtual.scene import Scene
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
 from scanweld.pipeline.run import run
-from scanweld.reconstruction import PairReport, Reconstruction
+from scanweld.reconstruction import Reconstruction
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
 """The defaults; nobody looks at the model."""
@@ -37,21 +37,17 @@ class Sets(Kept):
             found = run(scene.scans, CONFIG, workers=1)
         except ScanweldError as error:
             return {"error": str(error), "pairs": [], "scans": []}
-        pairs = [_pair(pair, scene) for pair in found.pairs if pair.i_from_j is not None]
+        pairs = [
+            {
+                **{"i": pair.i, "j": pair.j, "kind": str(pair.kind)},
+                **{"observability": pair.observability, "accepted": pair.accepted},
+                "grounds": dict(pair.grounds),
+                "right": is_right_pair(pair.i, pair.j, pair.i_from_j, scene),
+            }
+            for pair in found.pairs
+            if pair.i_from_j is not None
+        ]
         return {"pairs": pairs, "scans": _scans(found, scene)}
-
-
-def _pair(pair: PairReport, scene: Scene) -> dict[str, Any]:
-    assert pair.i_from_j is not None
-    return {
-        "i": pair.i,
-        "j": pair.j,
-        "kind": str(pair.kind),
-        "observability": pair.observability,
-        "accepted": pair.accepted,
-        "grounds": dict(pair.grounds),
-        "right": is_right_pair(pair.i, pair.j, pair.i_from_j, scene),
-    }
 
 
 def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
@@ -61,9 +57,7 @@ def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
         core = _largest_agreeing(found, component, scene)
         records += [
             {
-                "name": name,
-                "component": number,
-                "reference": name == component[0],
+                **{"name": name, "component": number, "reference": name == component[0]},
                 "grounds": dict(found.scans[name].grounds),
                 "right": name in core,
             }
@@ -76,13 +70,10 @@ def _largest_agreeing(
     found: Reconstruction, component: Sequence[str], scene: Scene
 ) -> frozenset[str]:
     """The most scans of a component that are right as one of them sees it; none if it is alone."""
-    beside = {
-        i: frozenset(
-            j
-            for j in component
-            if j != i and is_right_pair(i, j, found.poses[i].inverse() @ found.poses[j], scene)
-        )
-        for i in component
-    }
+
+    def agree(i: str, j: str) -> bool:
+        return is_right_pair(i, j, found.poses[i].inverse() @ found.poses[j], scene)
+
+    beside = {i: frozenset(j for j in component if j != i and agree(i, j)) for i in component}
     largest = max(component, key=lambda i: len(beside[i]))
     return beside[largest] | {largest} if beside[largest] else frozenset()

@@ -1,7 +1,7 @@
 """Fit the calibrated model: curves that never fall, and frequencies counted on held-out objects."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.optimize import minimize
@@ -19,8 +19,7 @@ MIN_COUNTED = 20
 """Examples behind each frequency, at least."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Examples:
+class Examples(NamedTuple):
     """What was seen, to learn from."""
 
     names: tuple[str, ...]  # Of the F grounds
@@ -28,8 +27,14 @@ class Examples:
     is_right: BoolArray  # (N,)
     groups: IntArray  # (N,) number of the set that each comes from: sets have their own objects
 
-    def __len__(self) -> int:
-        return len(self.is_right)
+    @classmethod
+    def of(
+        cls, rows: Sequence[Mapping[str, float]], is_right: Sequence[bool], groups: Sequence[int]
+    ) -> Self:
+        """From named grounds."""
+        names = tuple(rows[0])
+        grounds = np.array([[row[name] for name in names] for row in rows])
+        return cls(names, grounds, np.array(is_right, dtype=bool), np.array(groups))
 
     def rows(self) -> list[dict[str, float]]:
         """The grounds of each, by name."""
@@ -37,36 +42,18 @@ class Examples:
 
     def only(self, kept: BoolArray) -> "Examples":
         """Some of them."""
-        return replace(
-            self,
-            grounds=self.grounds[kept],
-            is_right=self.is_right[kept],
-            groups=self.groups[kept],
-        )
+        return Examples(self.names, self.grounds[kept], self.is_right[kept], self.groups[kept])
 
     def without(self, name: str) -> "Examples":
         """All of them, one ground left out."""
         k = self.names.index(name)
-        names = self.names[:k] + self.names[k + 1 :]
-        return replace(self, names=names, grounds=np.delete(self.grounds, k, axis=1))
-
-
-def make_examples(
-    rows: Sequence[Mapping[str, float]], is_right: Sequence[bool], groups: Sequence[int]
-) -> Examples:
-    """Examples from named grounds."""
-    names = tuple(rows[0])
-    return Examples(
-        names=names,
-        grounds=np.array([[row[name] for name in names] for row in rows]),
-        is_right=np.array(is_right, dtype=bool),
-        groups=np.array(groups),
-    )
+        names, grounds = self.names[:k] + self.names[k + 1 :], np.delete(self.grounds, k, axis=1)
+        return self._replace(names=names, grounds=grounds)
 
 
 def fit(examples: Examples) -> Model:
     """Curves from all examples; frequencies of sums that curves from other objects gave."""
-    totals = np.zeros(len(examples))
+    totals = np.zeros(len(examples.groups))
     for fold in folds(examples):
         curves, held_out = fit_curves(examples.only(~fold)), examples.only(fold)
         columns = zip(examples.names, held_out.grounds.T, strict=True)
@@ -77,7 +64,7 @@ def fit(examples: Examples) -> Model:
 
 def held_out_probabilities(examples: Examples) -> FloatArray:
     """Probability (N,) of each example by a model that has seen nothing of its object."""
-    found = np.zeros(len(examples))
+    found = np.zeros(len(examples.groups))
     for fold in folds(examples):
         model = fit(examples.only(~fold))
         found[fold] = [model.probability(row) for row in examples.only(fold).rows()]
@@ -93,24 +80,21 @@ def folds(examples: Examples) -> list[BoolArray]:
 
 def fit_curves(examples: Examples) -> dict[str, Curve]:
     """Logistic regression on ramps from each knot to the next, none of which may go down."""
-    knots = [np.unique(np.quantile(column, QUANTILES)) for column in examples.grounds.T]
-    ramps = np.concatenate(
-        [
-            np.clip((x[:, None] - at[:-1]) / np.diff(at), 0.0, 1.0)
-            for x, at in zip(examples.grounds.T, knots, strict=True)
-        ],
-        axis=1,
-    )
+    columns = examples.grounds.T
+    knots = [np.unique(np.quantile(column, QUANTILES)) for column in columns]
+    each = zip(columns, knots, strict=True)
+    ramps = [np.clip((x[:, None] - at[:-1]) / np.diff(at), 0.0, 1.0) for x, at in each]
+    matrix = np.concatenate(ramps, axis=1)
     sign = np.where(examples.is_right, -1.0, 1.0)
 
     def loss(weights: FloatArray) -> tuple[float, FloatArray]:
-        away = sign * (weights[0] + ramps @ weights[1:])
+        away = sign * (weights[0] + matrix @ weights[1:])
         pull = sign * expit(away)
         value = np.logaddexp(0.0, away).sum() + 0.5 * PENALTY * weights[1:] @ weights[1:]
-        return float(value), np.r_[pull.sum(), pull @ ramps + PENALTY * weights[1:]]
+        return float(value), np.r_[pull.sum(), pull @ matrix + PENALTY * weights[1:]]
 
-    start = np.zeros(1 + ramps.shape[1])
-    limits = [(None, None)] + [(0.0, None)] * ramps.shape[1]
+    start = np.zeros(1 + matrix.shape[1])
+    limits = [(None, None)] + [(0.0, None)] * matrix.shape[1]
     weights = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=limits).x
     steps = np.split(weights[1:], np.cumsum([len(at) - 1 for at in knots])[:-1])
     values = [np.r_[0.0, np.cumsum(step)] for step in steps]
@@ -122,7 +106,7 @@ def fit_curves(examples: Examples) -> dict[str, Curve]:
 def count_frequencies(totals: FloatArray, is_right: BoolArray) -> Curve:
     """How often what has such a sum is right: isotonic regression of Laplace's estimate."""
     order = np.argsort(totals, kind="stable")
-    pools: list[FloatArray] = []
+    pools: list[FloatArray] = []  # Sum, number right, number
     for part in np.array_split(order, max(len(totals) // MIN_COUNTED, 1)):
         pools.append(np.array([totals[part].sum(), is_right[part].sum(), len(part)]))
         while len(pools) > 1 and not np.all(_point(pools[-2]) < _point(pools[-1])):
@@ -133,6 +117,6 @@ def count_frequencies(totals: FloatArray, is_right: BoolArray) -> Curve:
 
 
 def _point(pool: FloatArray) -> FloatArray:
-    """Mean sum and frequency of examples that are counted together: sum, number right, number."""
+    """Mean sum and frequency of examples that are counted together."""
     total, right, count = pool
     return np.array([total / count, (right + 1) / (count + 2)])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.calibration.collect import CONFIG
-from benchmarks.calibration.fit import Examples, fit, held_out_probabilities, make_examples
+from benchmarks.calibration.fit import Examples, fit, held_out_probabilities
 from benchmarks.kept import CALIBRATED, Record, code_digest
 from benchmarks.scores import Stated
 from scanweld.confidence.assess import cap_by_links, cap_undecided
@@ -26,10 +26,10 @@ class Learned:
     """What all sets together say."""
 
     calibration: Calibration  # The models
-    pairs: Examples  # Of pairs
-    scans: Examples  # Of scans, with the held-out confidences of their pairs in their links
-    stated_pairs: Stated  # Held-out confidences of the pairs
-    stated_scans: Stated  # Held-out confidences of the scans
+    pairs: Examples
+    scans: Examples  # With the held-out confidences of their pairs in their links
+    stated_pairs: Stated  # Held-out confidences
+    stated_scans: Stated
 
 
 def learn(records: Sequence[Record], command: str) -> Learned:
@@ -41,25 +41,18 @@ def learn(records: Sequence[Record], command: str) -> Learned:
     """
     told = [pair for record in records for pair in record.result["pairs"]]
     groups = [record.unit["seed"] for record in records for _ in record.result["pairs"]]
-    pairs = make_examples([p["grounds"] for p in told], [p["right"] for p in told], groups)
+    pairs = Examples.of([p["grounds"] for p in told], [p["right"] for p in told], groups)
     probabilities = zip(held_out_probabilities(pairs).tolist(), told, strict=True)
     confidences = [
         cap_undecided(p, _as_told(pair), pair["grounds"], CONFIG) for p, pair in probabilities
     ]
     scans = _scan_examples(records, confidences)
-    held = [
-        cap_by_links(probability, row, CONFIG)
-        for probability, row in zip(
-            held_out_probabilities(scans).tolist(), scans.rows(), strict=True
-        )
-    ]
+    probabilities = zip(held_out_probabilities(scans).tolist(), scans.rows(), strict=True)
+    held = [cap_by_links(probability, row, CONFIG) for probability, row in probabilities]
     digest = hashlib.sha256(json.dumps([record.result for record in records]).encode())
     made = {
-        "command": command,
-        "code": code_digest(CALIBRATED),
-        "sets": len(records),
-        "pairs": len(pairs),
-        "scans": len(scans),
+        **{"command": command, "code": code_digest(CALIBRATED), "sets": len(records)},
+        **{"pairs": len(pairs.groups), "scans": len(scans.groups)},
         "digest": digest.hexdigest()[:16],
     }
     return Learned(
@@ -81,14 +74,14 @@ def _scan_examples(records: Sequence[Record], pair_confidences: Sequence[float])
     left = iter(pair_confidences)
     rows: list[tuple[dict[str, float], bool, int]] = []
     for record in records:
-        confidence = {(p["i"], p["j"]): next(left) for p in record.result["pairs"]}
-        accepted = [(p["i"], p["j"]) for p in record.result["pairs"] if p["accepted"]]
-        tied = _links(record.result["scans"], {edge: confidence[edge] for edge in accepted})
-        rows += [
-            ({**scan["grounds"], "link": tied[scan["name"]]}, scan["right"], record.unit["seed"])
-            for scan in record.result["scans"]
-        ]
-    return make_examples(*zip(*rows, strict=True))
+        pairs, scans = record.result["pairs"], record.result["scans"]
+        confidence = {(pair["i"], pair["j"]): next(left) for pair in pairs}
+        accepted = [(pair["i"], pair["j"]) for pair in pairs if pair["accepted"]]
+        tied = _links(scans, {edge: confidence[edge] for edge in accepted})
+        for scan in scans:
+            grounds = {**scan["grounds"], "link": tied[scan["name"]]}
+            rows.append((grounds, scan["right"], record.unit["seed"]))
+    return Examples.of(*zip(*rows, strict=True))
 
 
 def _links(
@@ -101,9 +94,8 @@ def _links(
     tied: dict[str, float] = {}
     for number in {scan["component"] for scan in scans}:
         of = [scan for scan in scans if scan["component"] == number]
-        component = Component(
-            poses={at[scan["name"]]: Pose.identity() for scan in of},
-            reference=next(at[scan["name"]] for scan in of if scan["reference"]),
-        )
+        poses = {at[scan["name"]]: Pose.identity() for scan in of}
+        reference = next(at[scan["name"]] for scan in of if scan["reference"])
+        component = Component(poses=poses, reference=reference)
         tied.update({names[k]: link for k, link in ties_of(component, numbered).items()})
     return tied

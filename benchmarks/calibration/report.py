@@ -1,4 +1,4 @@
-"""What the calibration found: the package's file, docs/data/calibration.json, pictures, a page."""
+"""What the calibration found: the package's file, docs/data/calibration.json and pictures."""
 
 import json
 from dataclasses import asdict
@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.blocks import markdown_table
 from benchmarks.calibration.fit import Examples, held_out_probabilities
 from benchmarks.calibration.learn import Learned
-from benchmarks.judging.plots import draw, pictures
 from benchmarks.results import Json, how_measured, machine, rounded, write_file
-from benchmarks.scores import Stated
+from benchmarks.scores import Stated, draw
 
 LEAST = (0.5, 0.8, 0.9, 0.95, 0.98)
 """Confidences from which on it is told how many of the right poses are left, and how many wrong."""
@@ -37,11 +35,20 @@ def measures(learned: Learned, *, quick: bool = False) -> Json:
     }
 
 
+def calibration_told(found: Json) -> Json:
+    """The values of the calibration's template: how much is lost without a ground, most first."""
+    lost = {}
+    for name, each in (("pairs", found["pair"]), ("scans", found["scan"])):
+        left = {k: less["auc"] for k, less in each["without"].items() if less["auc"] is not None}
+        less = [(ground, (each["auc"] or np.nan) - auc) for ground, auc in left.items()]
+        lost[name] = sorted(less, key=lambda ground: -ground[1])
+    return {"how": how_measured(found), "found": found, "lost": lost}
+
+
 def _measures(examples: Examples, stated: Stated, quick: bool) -> Json:
     less = {} if quick else {name: examples.without(name) for name in examples.names}
     return {
-        "count": len(stated),
-        "right": stated.num_right,
+        **{"count": len(stated), "right": stated.num_right},
         **_quality(stated),
         "brier": stated.brier,
         "bins": [asdict(b) for b in stated.bins()],
@@ -54,6 +61,7 @@ def _measures(examples: Examples, stated: Stated, quick: bool) -> Json:
 
 
 def _quality(stated: Stated) -> Json:
+    """A few sets may have no wrong pose, and so no AUC."""
     values = {"auc": stated.auc, "error": stated.calibration_error()}
     return {key: value if np.isfinite(value) else None for key, value in values.items()}
 
@@ -61,48 +69,3 @@ def _quality(stated: Stated) -> Json:
 def _kept_from(least: float, stated: Stated) -> Json:
     is_right = stated.is_right[stated.scores >= least]
     return {"least": least, "right": int(is_right.sum()), "wrong": int((~is_right).sum())}
-
-
-def calibration_told(found: Json) -> str:
-    """The calibration in Markdown, for docs/trust.md."""
-    both = {"pairs": found["pair"], "scans": found["scan"]}
-    told = (
-        f"{how_measured(found)}: {found['sets']} sets of other objects than above, and none of "
-        "them in the part of the calibration that it is measured by. "
-    )
-    if "code" in found:
-        told += f"They are of code {found['code']}.\n\n"
-    else:
-        told += "Their code was not recorded: it is older than that of the runs above.\n\n"
-    rows = [
-        (name, each["count"], each["right"], *_cells(each, auc=4, error=3, brier=3))
-        for name, each in both.items()
-    ]
-    head = ("", "poses", "right", "AUC", "calibration error", "Brier score")
-    parts = [told + markdown_table(head, rows), pictures("calibration", "poses")]
-    parts += [_kept(name, each) for name, each in both.items()]
-    parts += [_grounds(name, each) for name, each in both.items()]
-    return "\n".join(parts)
-
-
-def _cells(found: Json, **digits: int) -> list[str]:
-    """Values; a few sets may have no wrong pose, and so no AUC."""
-    return [f"{found[key]:.{d}f}" if found[key] is not None else "-" for key, d in digits.items()]
-
-
-def _kept(name: str, found: Json) -> str:
-    parts = [
-        f"from {kept['least']:g} on {kept['right']} of {found['right']} right ones and "
-        f"{kept['wrong']} wrong"
-        for kept in found["kept"]
-    ]
-    return f"Of the {name} have a confidence {'; '.join(parts)}.\n"
-
-
-def _grounds(name: str, found: Json) -> str:
-    """How much worse the model is without each ground, the most important first."""
-    known = {k: less["auc"] for k, less in found["without"].items() if less["auc"] is not None}
-    lost = {ground: (found["auc"] or np.nan) - auc for ground, auc in known.items()}
-    ranked = sorted(lost, key=lambda ground: -lost[ground])
-    told = ", ".join(f"{ground} {1e4 * lost[ground]:+.0f}" for ground in ranked)
-    return f"AUC that {name} lose without a ground, in 0.0001: {told}.\n"

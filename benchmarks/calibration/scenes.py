@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.calibration.solids import SOLIDS
 from benchmarks.virtual import disturbances as harm
-from benchmarks.virtual.bodies import Body
+from benchmarks.virtual.bodies import Body, Rng
 from benchmarks.virtual.disturbances import Disturbance, each
 from benchmarks.virtual.scene import HIDDEN_PIXELS, Scene, posed, with_mark_seen
 from benchmarks.virtual.scenery import held_by_hand, on_table, on_turntable
@@ -16,8 +16,6 @@ from benchmarks.virtual.shots import Shot, take_shots
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import View, view_of
 from scanweld.geometry.scan import principal_diameter
-
-Rng = np.random.Generator
 
 HARM, SCENERY, STRANGERS = 0.45, 0.15, 0.2
 """Share of the sets in which something goes wrong besides noise and dropouts, in which something
@@ -32,7 +30,7 @@ def make_set(seed: int) -> Scene:
     """The scans of a set, in random frames, and the truth about them."""
     rng = np.random.default_rng([seed, 11])
     family = str(rng.choice([make.__name__ for make in SOLIDS], p=list(SOLIDS.values())))
-    body = make_solid(family, seed)
+    body = _make_solid(family, seed)
     noise = NoiseModel(
         depth_diameters=MAX_NOISE * 10 ** rng.uniform(-1.7, 0.0),
         dropout=float(rng.choice([0.0, 0.01, 0.1, 0.3])),
@@ -50,7 +48,7 @@ def make_set(seed: int) -> Scene:
     return posed(shots, body, principal_diameter(body.mesh.vertices), seed)
 
 
-def make_solid(family: str, seed: int) -> Body:
+def _make_solid(family: str, seed: int) -> Body:
     """One of ``SOLIDS`` by its name; others by seed."""
     make = next(make for make in SOLIDS if make.__name__ == family)
     return make(np.random.default_rng([seed, 7]))
@@ -70,14 +68,13 @@ def _views(body: Body, rng: Rng) -> list[View]:
     azimuths += rng.uniform(0, 360)
     rolls = rng.uniform(-180, 180, size=count)
     angles = np.stack([azimuths, elevations, rolls], axis=-1).tolist()
-    return [
-        view_of(body.mesh, *angles[k], pixels=max(64.0, float(pixels[k]))) for k in range(count)
-    ]
+    across = np.maximum(64.0, pixels).tolist()
+    return [view_of(body.mesh, *a, pixels=p) for a, p in zip(angles, across, strict=True)]
 
 
 def _strangers(family: str, noise: NoiseModel, seed: int, rng: Rng) -> Sequence[Shot]:
     """Two or three scans of another object of the family, in a world of their own."""
-    other, away = make_solid(family, seed + OTHER), harm.far_away(rng)
+    other, away = _make_solid(family, seed + OTHER), harm.far_away(rng)
     shots = take_shots(other, _views(other, rng)[:3], noise, seed + OTHER)
     return [replace(shot, world=1, world_from_sensor=away @ shot.pose) for shot in shots]
 

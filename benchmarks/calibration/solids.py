@@ -7,20 +7,19 @@ import trimesh
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from benchmarks.virtual.bodies import Body, Profile, joined, toothed
+from benchmarks.virtual.bodies import Body, Profile, Rng, joined, toothed
 from scanweld.evaluation.primitives import lathe
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import random_rotation
 
-Rng = np.random.Generator
 SIZE = 100.0
+_BALL = trimesh.creation.icosphere(subdivisions=5)
 
 
 def blob(rng: Rng) -> Body:
     """A ball with broad and narrow bumps and dents, stretched."""
-    ball = _ball()
-    return Body(mesh=_radial(ball, 1.0 + _bumps(ball, rng, 14, 0.35), rng.uniform(0.5, 1.2, 3)))
+    return Body(_radial(1.0 + _bumps(rng, 14, 0.35), rng.uniform(0.5, 1.2, 3)))
 
 
 def hulls(rng: Rng) -> Body:
@@ -31,7 +30,7 @@ def hulls(rng: Rng) -> Body:
         place = rng.normal(size=3) * 22.0
         vertices = 0.7 * other.vertices @ random_rotation(rng).T + place
         mesh = joined(mesh, TriangleMesh(vertices=vertices, faces=other.faces))
-    return Body(mesh=mesh)
+    return Body(mesh)
 
 
 def twisted(rng: Rng) -> Body:
@@ -47,13 +46,12 @@ def twisted(rng: Rng) -> Body:
             r = r + height * np.exp(-away2 / (2 * width**2))
         return np.maximum(r, 3.0)
 
-    return Body(mesh=lathe(radius))
+    return Body(lathe(radius))
 
 
 def displaced(rng: Rng) -> Body:
     """A superquadric with bumps."""
-    ball = _ball()
-    return Body(mesh=_radial(ball, _superquadric(ball, rng) * (1.0 + _bumps(ball, rng, 10, 0.2))))
+    return Body(_radial(_superquadric(rng) * (1.0 + _bumps(rng, 10, 0.2))))
 
 
 def relief(rng: Rng) -> Body:
@@ -76,14 +74,14 @@ def relief(rng: Rng) -> Body:
         *((rim, after, after + top), (rim, after + top, rim + top)),
     ]
     faces = [np.stack(f, axis=-1).reshape(-1, 3) for f in corners]
-    return Body(mesh=TriangleMesh(vertices=vertices, faces=np.concatenate(faces)))
+    return Body(TriangleMesh(vertices=vertices, faces=np.concatenate(faces)))
 
 
 def vessel(rng: Rng) -> Body:
     """A surface of revolution."""
     profile = _profile(rng)
     mesh = lathe(lambda turn, level: np.maximum(profile(level), 3.0) + 0.0 * turn)
-    return Body(mesh=mesh, is_symmetric=True)
+    return Body(mesh, is_symmetric=True)
 
 
 def prism(rng: Rng) -> Body:
@@ -95,13 +93,13 @@ def prism(rng: Rng) -> Body:
         side = np.cos(half) / np.cos(np.mod(turn, 2 * half) - half)
         return size * side * (1.0 - taper * level)
 
-    return Body(mesh=lathe(radius), is_symmetric=True)
+    return Body(lathe(radius), is_symmetric=True)
 
 
 def star(rng: Rng) -> Body:
     """With equal arms."""
     mesh = lathe(_star(rng), height=rng.uniform(20.0, 80.0))
-    return Body(mesh=mesh, is_symmetric=True)
+    return Body(mesh, is_symmetric=True)
 
 
 def marked_star(rng: Rng) -> Body:
@@ -114,13 +112,12 @@ def marked_star(rng: Rng) -> Body:
         return plain(turn, level) + depth * np.exp(-0.5 * away2)
 
     height = rng.uniform(40.0, 80.0)
-    return Body(mesh=lathe(radius, height=height), unmarked=lathe(plain, height=height))
+    return Body(lathe(radius, height=height), unmarked=lathe(plain, height=height))
 
 
 def superquadric(rng: Rng) -> Body:
     """Between a box, a ball and an octahedron: two half turns leave it as it is."""
-    ball = _ball()
-    return Body(mesh=_radial(ball, _superquadric(ball, rng)), is_symmetric=True)
+    return Body(_radial(_superquadric(rng)), is_symmetric=True)
 
 
 SOLIDS: Mapping[Callable[[Rng], Body], float] = {
@@ -130,31 +127,26 @@ SOLIDS: Mapping[Callable[[Rng], Body], float] = {
 """How often each is drawn."""
 
 
-def _ball() -> TriangleMesh:
-    mesh = trimesh.creation.icosphere(subdivisions=5)
-    return TriangleMesh(vertices=np.array(mesh.vertices), faces=np.array(mesh.faces))
+def _radial(radius: FloatArray, stretch: FloatArray | float = 1.0) -> TriangleMesh:
+    """The unit sphere's vertices at other radii, stretched."""
+    vertices = np.array(_BALL.vertices) * np.maximum(radius, 0.15)[:, None] * stretch
+    vertices = 0.5 * SIZE * vertices / np.abs(vertices).max()
+    return TriangleMesh(vertices=vertices, faces=np.array(_BALL.faces))
 
 
-def _radial(
-    ball: TriangleMesh, radius: FloatArray, stretch: FloatArray | float = 1.0
-) -> TriangleMesh:
-    vertices = ball.vertices * np.maximum(radius, 0.15)[:, None] * stretch
-    return TriangleMesh(vertices=0.5 * SIZE * vertices / np.abs(vertices).max(), faces=ball.faces)
-
-
-def _bumps(ball: TriangleMesh, rng: Rng, count: int, height: float) -> FloatArray:
+def _bumps(rng: Rng, count: int, height: float) -> FloatArray:
     """A sum of bumps and dents on the unit sphere, each about its own direction."""
-    total = np.zeros(len(ball.vertices))
+    total = np.zeros(len(_BALL.vertices))
     for _ in range(count):
         towards = rng.normal(size=3)
-        cosine = ball.vertices @ (towards / np.linalg.norm(towards))
+        cosine = np.array(_BALL.vertices) @ (towards / np.linalg.norm(towards))
         total += rng.uniform(-height, height) * np.exp(rng.uniform(4, 40) * (cosine - 1.0))
     return total
 
 
-def _superquadric(ball: TriangleMesh, rng: Rng) -> FloatArray:
+def _superquadric(rng: Rng) -> FloatArray:
     power = rng.uniform(1.2, 8.0)
-    axes = np.abs(ball.vertices) / np.sort(rng.uniform(0.5, 1.0, size=3))
+    axes = np.abs(_BALL.vertices) / np.sort(rng.uniform(0.5, 1.0, size=3))
     return (axes**power).sum(axis=1) ** (-1.0 / power)
 
 

@@ -1,8 +1,4 @@
-"""The heat kernel signature on a complete mesh: what PA-HKS would be if a scan saw everything.
-
-Only a virtual object has its complete mesh beside its scans; the signature says how much of the
-descriptor is lost with the surface that no single view shows.
-"""
+"""The heat kernel signature on a complete mesh: what PA-HKS would be if a scan saw everything."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -53,11 +49,7 @@ def full_mesh_spectrum(
 
 
 def full_mesh_hks(spectrum: Spectrum) -> FloatArray:
-    """Log heat signature (V, T) of a complete mesh's vertices, at the times that PA-HKS uses.
-
-    HKS(x, t) = sum_i exp(-lambda_i t) phi_i(x)^2 (Sun, Ovsjanikov & Guibas 2009), over the
-    heat trace; see ``heat_signature``.
-    """
+    """Log heat signature (V, T) of a complete mesh's vertices, at the times that PA-HKS uses."""
     times = diffusion_times(spectrum.eigenvalues, _NUM_TIMES, _LONGEST_DIAMETERS2)
     return heat_signature(spectrum.eigenvalues, spectrum.functions, times)
 

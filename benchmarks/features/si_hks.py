@@ -24,12 +24,6 @@ def si_heat_signature(
     derivative removes it, and the magnitude of the Fourier transform over tau = log2 t removes the
     shift (Bronstein & Kokkinos 2010, section 3). The window of times must be wide enough for the
     derivative to vanish at its ends.
-
-    Args:
-        eigenvalues: (K,).
-        functions: (V, K).
-        times: (T,), evenly spaced in the logarithm: see ``octave_times``.
-        num_frequencies: F; the paper takes 6.
     """
     rate = np.outer(eigenvalues, times)
     decay = np.exp(-rate)

@@ -29,12 +29,6 @@ def wave_signature(
 
     C_e = 1 / sum_k exp(-(e - log lambda_k)^2 / (2 sigma^2)), so that the signature at every energy
     integrates to one over the surface (Aubry et al. 2011). Constant modes are skipped.
-
-    Args:
-        eigenvalues: (K,).
-        functions: (V, K) of unit norm under the surface's area.
-        log_energies: (E,) logarithms of energies, in the eigenvalues' unit.
-        width: sigma.
     """
     varies = eigenvalues > _CONSTANT
     apart = (log_energies - np.log(eigenvalues[varies])[:, None]) / width

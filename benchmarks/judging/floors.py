@@ -1,14 +1,12 @@
 """What the runs must show, beside what they show."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from benchmarks.judging.trial import CRASH, Outcome, PairOutcome, ScanOutcome
-from benchmarks.scores import Stated, bound
+from benchmarks.judging import outcomes as judged
+from benchmarks.judging.outcomes import Outcome, ScanOutcome, determined, share
+from benchmarks.scores import bound
 from benchmarks.sets import SETS
 from benchmarks.virtual.scene import Group
 from scanweld.reconstruction import Verdict
@@ -22,8 +20,7 @@ FACTOR_SLACK = 0.004
 _NUMBER = re.compile(r"(\d+\.\d+)(\s*%)?")
 
 
-@dataclass(frozen=True, slots=True)
-class Floor:
+class Floor(NamedTuple):
     """What is measured, what must be reached, what is reached; None where it is not judged."""
 
     measure: str
@@ -34,12 +31,9 @@ class Floor:
 
 def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
     """All floors but those of the real sets."""
-    scans, pairs = scans_of(outcomes), stated_pairs(outcomes)
+    scans = judged.scans_of(outcomes)
     good = [scan for scan in scans if scan.is_good]
     strangers = [scan for scan in scans if scan.is_stranger]
-    scaled = [scan for scan in scans if scan.factor != 1.0]
-    not_good, named = sum(not s.is_good for s in scaled), sum(map(names_factor, scaled))
-    error, crashes = pairs.calibration_error(), sum(o.verdict == CRASH for o in outcomes)
     return [
         _none(
             "scans called good that are wrong, or whose pose nothing determines",
@@ -52,28 +46,16 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
             {f"of {len(strangers)}": sum(scan.is_good for scan in strangers)},
             [outcome for outcome in outcomes if any(s.is_stranger for s in outcome.scans)],
         ),
-        _clean(outcomes),
+        _clean(determined(o for o in outcomes if o.group is Group.CLEAN)),
         _worst(outcomes, Group.HARD, MIN_HARD, "each hard condition alone"),
         _worst(outcomes, Group.CROP, MIN_CROP, "each crop alone"),
-        Floor(
-            "a scan whose scale is wrong by 1 %: doubtful or refused, with the factor",
-            "all",
-            f"{not_good} of {len(scaled)}, with the factor {named}",
-            not_good == named == len(scaled) if scaled else None,
+        _scaled([scan for scan in scans if scan.factor != 1.0]),
+        *_confidence(outcomes),
+        _none(
+            "runs that crash",
+            {f"of {len(outcomes)}": sum(o.verdict == judged.CRASH for o in outcomes)},
+            outcomes,
         ),
-        Floor(
-            "confidence of pairs, right against wrong: AUC",
-            f">= {MIN_AUC:g}",
-            f"{pairs.auc:.4f} of {len(pairs)} pairs, {pairs.num_right} right",
-            pairs.auc >= MIN_AUC if len(pairs) else None,
-        ),
-        Floor(
-            "the same: expected calibration error",
-            f"<= {MAX_CALIBRATION_ERROR:g}",
-            f"{error:.4f}",
-            error <= MAX_CALIBRATION_ERROR if len(pairs) else None,
-        ),
-        _none("runs that crash", {f"of {len(outcomes)}": crashes}, outcomes),
     ]
 
 
@@ -81,46 +63,9 @@ def real_sets(runs: Sequence[Mapping[str, Any]]) -> Floor:
     """The records of ``benchmarks.run``, against the floors of its sets."""
     met = sum(SETS[run["set"]].is_met(run) for run in runs)
     good = sum(run["verdict"] == Verdict.GOOD for run in runs)
-    return Floor(
-        "the real sets: at their floors, verdict good",
-        "all",
-        f"{met} of {len(runs)} at their floors, {good} good",
-        met == good == len(runs),
-    )
-
-
-def scans_of(outcomes: Iterable[Outcome]) -> list[ScanOutcome]:
-    """All scans of all runs."""
-    return [scan for outcome in outcomes for scan in outcome.scans]
-
-
-def posed_pairs(outcomes: Iterable[Outcome]) -> list[PairOutcome]:
-    """All pairs of all runs that have a pose."""
-    return [pair for outcome in outcomes for pair in outcome.pairs if pair is not None]
-
-
-def determined(outcomes: Iterable[Outcome]) -> list[ScanOutcome]:
-    """The scans that belong and whose pose is determined by what they show."""
-    return [scan for scan in scans_of(outcomes) if scan.is_determined]
-
-
-def stated_pairs(outcomes: Iterable[Outcome]) -> Stated:
-    """Confidences of all pairs that have a pose."""
-    return Stated.of((pair.confidence, pair.is_right) for pair in posed_pairs(outcomes))
-
-
-def stated_scans(outcomes: Iterable[Outcome]) -> Stated:
-    """Confidences of all placed scans: whether they are right beside others of their component."""
-    return Stated.of(
-        (scan.confidence, scan.is_placed and not scan.is_false)
-        for scan in scans_of(outcomes)
-        if scan.confidence is not None and scan.is_placed
-    )
-
-
-def share(scans: Sequence[ScanOutcome], holds: Callable[[ScanOutcome], bool]) -> float:
-    """Share of scans of which something holds; NaN of none."""
-    return float(np.mean([holds(scan) for scan in scans])) if scans else float("nan")
+    reached = f"{met} of {len(runs)} at their floors, {good} good"
+    is_met = met == good == len(runs)
+    return Floor("the real sets: at their floors, verdict good", "all", reached, is_met)
 
 
 def names_factor(scan: ScanOutcome) -> bool:
@@ -135,46 +80,57 @@ def _none(measure: str, counts: Mapping[str, int], runs: Sequence[Outcome]) -> F
     """Something that must not happen in any of these runs; beside a zero stands its bound."""
     told = ", ".join(f"{count} {of}" for of, count in counts.items())
     is_met = not any(counts.values())
-    told += f" ({bound(len(runs))})" if is_met and runs else ""
-    return Floor(measure, "0", told, is_met)
+    return Floor(measure, "0", told + (f" ({bound(len(runs))})" if is_met and runs else ""), is_met)
 
 
 def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     """Poses that are asserted although several explain what the scans show."""
-    scans = [scan for scan in scans_of(outcomes) if scan.is_open]
-    pairs = [pair for pair in posed_pairs(outcomes) if pair.is_open]
+    scans = [scan for scan in judged.scans_of(outcomes) if scan.is_open]
+    pairs = [pair for pair in judged.posed_pairs(outcomes) if pair.is_open]
     counts = {
         f"of {len(some)} {name}": sum((each.confidence or 0.0) > ASSERTED for each in some)
         for name, some in (("scans", scans), ("pairs", pairs))
     }
     measure = f"symmetric and sliding objects: pose asserted with confidence > {ASSERTED:g}"
-    runs = [outcome for outcome in outcomes if any(s.is_open for s in outcome.scans)]
-    found = _none(measure, counts, runs)
-    return found if scans else Floor(measure, "0", found.reached, None)
+    found = _none(measure, counts, [o for o in outcomes if any(s.is_open for s in o.scans)])
+    return found if scans else found._replace(is_met=None)
 
 
-def _clean(outcomes: Sequence[Outcome]) -> Floor:
-    scans = determined(o for o in outcomes if o.group is Group.CLEAN)
-    reached = share(scans, lambda scan: scan.is_good and scan.is_right)
-    return Floor(
-        "clean scenarios: scans called good and right",
-        f">= {100 * MIN_CLEAN:g} %",
-        f"{100 * reached:.1f} % of {len(scans)}",
-        reached >= MIN_CLEAN if scans else None,
-    )
+def _scaled(scans: Sequence[ScanOutcome]) -> Floor:
+    not_good, named = sum(not s.is_good for s in scans), sum(map(names_factor, scans))
+    measure = "a scan whose scale is wrong by 1 %: doubtful or refused, with the factor"
+    is_met = not_good == named == len(scans) if scans else None
+    return Floor(measure, "all", f"{not_good} of {len(scans)}, with the factor {named}", is_met)
+
+
+def _clean(scans: Sequence[ScanOutcome]) -> Floor:
+    reached, asked = share(scans, "is_good", "is_right"), f">= {100 * MIN_CLEAN:g} %"
+    told, is_met = f"{100 * reached:.1f} % of {len(scans)}", reached >= MIN_CLEAN
+    measure = "clean scenarios: scans called good and right"
+    return Floor(measure, asked, told, is_met if scans else None)
 
 
 def _worst(outcomes: Sequence[Outcome], group: Group, floor: float, told: str) -> Floor:
     """The scenario of a group with the fewest right scans of those that belong."""
-    shares = {
-        name: share(determined(o for o in outcomes if o.scenario == name), lambda s: s.is_right)
-        for name in dict.fromkeys(o.scenario for o in outcomes if o.group is group)
-    }
+    names = dict.fromkeys(o.scenario for o in outcomes if o.group is group)
+    scans = {name: determined(o for o in outcomes if o.scenario == name) for name in names}
+    shares = {name: share(some, "is_right") for name, some in scans.items()}
     missed = [name for name in shares if not shares[name] >= floor]
     worst = min(shares, key=lambda name: shares[name], default="none")
     reached = f"least: {worst}, {100 * shares[worst]:.0f} %" if shares else "not measured"
     if missed:
         reached += f"; {len(missed)} of {len(shares)} below"
-    asked = f">= {100 * floor:g} %"
-    is_met = not missed if shares else None
-    return Floor(f"{told}: right, of the scans that belong", asked, reached, is_met)
+    measure, is_met = f"{told}: right, of the scans that belong", not missed if shares else None
+    return Floor(measure, f">= {100 * floor:g} %", reached, is_met)
+
+
+def _confidence(outcomes: Sequence[Outcome]) -> list[Floor]:
+    pairs = judged.stated_pairs(outcomes)
+    area, error, is_any = pairs.auc, pairs.calibration_error(), len(pairs) > 0
+    told = f"{area:.4f} of {len(pairs)} pairs, {pairs.num_right} right"
+    auc, ece = "confidence of pairs, right against wrong: AUC", "expected calibration error"
+    is_near = error <= MAX_CALIBRATION_ERROR if is_any else None
+    return [
+        Floor(auc, f">= {MIN_AUC:g}", told, area >= MIN_AUC if is_any else None),
+        Floor(f"the same: {ece}", f"<= {MAX_CALIBRATION_ERROR:g}", f"{error:.4f}", is_near),
+    ]

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
-from benchmarks.blocks import markdown_table
-from benchmarks.judging.runs import seeded
-from benchmarks.judging.trial import CONFIG, Outcome, is_right_pair
+from benchmarks.judging.outcomes import Outcome, stated_pairs
+from benchmarks.judging.trial import CONFIG, QUICK, is_right_pair, seeded
 from benchmarks.kept import Kept, Record, Result, Unit
 from benchmarks.paper.baselines.fpfh import fpfh_ransac
 from benchmarks.paper.baselines.kiss import kiss_gicp
@@ -44,7 +43,7 @@ class OtherTools(Kept):
 
     def units(self, quick: bool) -> list[Unit]:
         """Scenario by scenario and seed by seed."""
-        return seeded({"64 pixels across": 1} if quick else COUNTS, self.first_seed)
+        return seeded(QUICK if quick else COUNTS, self.first_seed)
 
     def measure(self, unit: Unit) -> Result:
         """Score and truth of every pair in the order of the names, by tool; None without a pose."""
@@ -67,20 +66,10 @@ class OtherTools(Kept):
 def answers_by_tool(records: Sequence[Record], outcomes: Sequence[Outcome]) -> dict[str, Stated]:
     """The answers of each tool to the pairs that all were given."""
     runs = {(outcome.scenario, outcome.seed): outcome for outcome in outcomes}
-    common = [r for r in records if (r.unit["scenario"], r.unit["seed"]) in runs]
-    own = (p for r in common for p in runs[r.unit["scenario"], r.unit["seed"]].pairs)
+    keys = [(record.unit["scenario"], record.unit["seed"]) for record in records]
+    common = [record for record, key in zip(records, keys, strict=True) if key in runs]
     others = {
         name: Stated.of(told for record in common for told in record.result[name] if told)
         for name in METHODS
     }
-    return {"own": Stated.of((pair.confidence, pair.is_right) for pair in own if pair), **others}
-
-
-def other_tools_table(records: Sequence[Record], outcomes: Sequence[Outcome]) -> str:
-    """How well what each tool says of its answers tells right from wrong."""
-    rows = [
-        (TITLES[name], len(told), told.num_right, f"{told.auc:.3f}", f"{100 * told.sure:.0f}")
-        for name, told in answers_by_tool(records, outcomes).items()
-    ]
-    headings = ("tool, and what it says", "pairs with a pose", "right", "AUC", "sure %")
-    return markdown_table(headings, rows)
+    return {"own": stated_pairs(runs[key] for key in keys if key in runs), **others}

@@ -1,30 +1,26 @@
-"""One run of the main job on a scene, and what it asserts held against the truth.
-
-A scan is *right* if its pose lies within 3 degrees and 1.5 % of the object's diameter of the truth
-in the largest component that has scans of its world. It is *falsely good* if it is called good but
-is not right, or if nothing that it shows determines its pose. A pair is right if its pose lies
-within 5 degrees and 3 %, and is determined.
-"""
+"""One run of the main job on a scene, and what it asserts held against the truth."""
 
 import time
 import traceback
-from collections.abc import Mapping
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
+from benchmarks.judging.outcomes import CRASH, ERROR, Outcome, PairOutcome, ScanOutcome
+from benchmarks.kept import Kept, Result, Unit
+from benchmarks.seeds import FIRST_FRESH
 from benchmarks.virtual.scenarios import SCENARIOS
-from benchmarks.virtual.scene import Group, Scene, make_scene
+from benchmarks.virtual.scene import Scene, make_scene
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
-from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
+from scanweld.evaluation.metrics import PoseErrors, evaluate_poses
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet
-from scanweld.pairs.result import PairKind
 from scanweld.pipeline.run import run
-from scanweld.reconstruction import PairReport, Reconstruction, ScanVerdict
+from scanweld.reconstruction import PairReport, Reconstruction
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=100))
 """The defaults, but for a coarse model: only poses are looked at."""
@@ -32,132 +28,44 @@ PAIR_DEG, PAIR_PERCENT = 5.0, 3.0
 """A pair's pose is right within these; the joint refinement comes after it."""
 MAX_REASON = 160
 """Characters of a reason that are kept."""
-CRASH, ERROR = "crash", "error"
+QUICK: Mapping[str, int] = {"64 pixels across": 1}
+"""Runs that show whether all works."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class ScanOutcome:
-    """What became of a scan; by default it is not placed."""
+@dataclass(kw_only=True)
+class Runs(Kept):
+    """Runs of scenarios by seeds, as units that are kept when done."""
 
-    source: str  # What it was made from, in words
-    world: int | None  # Number of its world; None if it belongs nowhere
-    is_open: bool  # Whether nothing that it shows determines its pose
-    factor: float  # By which it is too large
-    verdict: str = str(ScanVerdict.UNPLACED)  # Good, doubtful or unplaced
-    standing: str = str(Standing.UNPLACED)  # Right, wrong or unplaced
-    is_apart: bool = False  # Whether it lies in another component than most of its world
-    # That its pose is right, as the report says; None if it is unplaced
-    confidence: float | None = None
-    rotation_deg: float | None = None  # Error of its pose; None where there is none
-    translation_percent: float | None = None  # The same, in percent of the object's diameter
-    reason: str = ""  # What the report says of it, where it is not both good and right
+    scenarios: Sequence[str] = tuple(SCENARIOS)  # Names
+    seeds: int = 10**6  # How many of each, at most
+    first_seed: int = FIRST_FRESH  # The first seed of each
+    NAME: str = "trust"
+    TITLE: str = "Trust"
 
-    @property
-    def is_right(self) -> bool:
-        """Whether it lies where it belongs, with the others."""
-        return self.standing == Standing.RIGHT and not self.is_apart
+    def units(self, quick: bool) -> list[Unit]:
+        """Scenario by scenario and seed by seed; one of a few if quick."""
+        counts = {name: min(self.seeds, SCENARIOS[name].seeds) for name in self.scenarios}
+        return seeded(QUICK if quick else counts, self.first_seed)
 
-    @property
-    def is_good(self) -> bool:
-        """Whether it is called good."""
-        return self.verdict == ScanVerdict.GOOD
-
-    @property
-    def is_placed(self) -> bool:
-        """Whether it has a pose."""
-        return self.standing != Standing.UNPLACED
-
-    @property
-    def is_false(self) -> bool:
-        """Whether it is placed although it is wrong, or although its pose is open."""
-        return self.standing == Standing.WRONG or (self.is_open and self.is_placed)
-
-    @property
-    def is_stranger(self) -> bool:
-        """Whether it belongs nowhere."""
-        return self.world is None
-
-    @property
-    def is_determined(self) -> bool:
-        """Whether it belongs, and what it shows determines its pose."""
-        return not self.is_stranger and not self.is_open
-
-    def brief(self) -> list[Any]:
-        """For JSON."""
-        return [float(f"{v:.3g}") if isinstance(v, float) else v for v in astuple(self)]
-
-    @classmethod
-    def of(cls, values: list[Any]) -> Self:
-        """From ``brief``."""
-        return cls(**dict(zip((f.name for f in fields(cls)), values, strict=True)))
+    def measure(self, unit: Unit) -> Result:
+        """One run, on one core."""
+        return try_out(unit["scenario"], unit["seed"]).record()
 
 
-@dataclass(frozen=True, slots=True)
-class PairOutcome:
-    """What became of a pair that has a pose."""
-
-    confidence: float  # That its pose is right, as the report says
-    kind: PairKind  # What the two scans alone say
-    is_accepted: bool  # Whether the view graph uses it
-    is_right: bool  # Whether its pose is right
-    is_open: bool  # Whether nothing that the two show determines it
-
-    def brief(self) -> list[Any]:
-        """For JSON: thousands of these stand in it."""
-        flags = (self.is_accepted, self.is_right, self.is_open)
-        return [round(self.confidence, 4), self.kind[0], *map(int, flags)]
-
-    @classmethod
-    def of(cls, values: list[Any]) -> Self:
-        """From ``brief``."""
-        confidence, initial, *flags = values
-        kind = next(kind for kind in PairKind if kind.startswith(initial))
-        return cls(confidence, kind, *map(bool, flags))
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Outcome:
-    """A run: its verdict in a word, its scans, its pairs in order (None: no pose), CPU seconds."""
-
-    scenario: str
-    seed: int
-    verdict: str
-    scans: tuple[ScanOutcome, ...]
-    pairs: tuple[PairOutcome | None, ...]
-    seconds: float
-    reason: str = ""
-
-    @property
-    def group(self) -> Group:
-        """What is asked of its scenario."""
-        return SCENARIOS[self.scenario].group
-
-    def record(self) -> dict[str, Any]:
-        """For JSON, without the scenario and the seed."""
-        return {
-            "verdict": self.verdict,
-            "seconds": self.seconds,
-            "reason": self.reason,
-            "scans": [scan.brief() for scan in self.scans],
-            "pairs": [pair and pair.brief() for pair in self.pairs],
-        }
-
-    @classmethod
-    def of(cls, unit: Mapping[str, Any], record: Mapping[str, Any]) -> Self:
-        """From a record."""
-        scans = tuple(ScanOutcome.of(values) for values in record["scans"])
-        pairs = tuple(values and PairOutcome.of(values) for values in record["pairs"])
-        return cls(**{**unit, **record, "scans": scans, "pairs": pairs})
+def seeded(counts: Mapping[str, int], first_seed: int) -> list[Unit]:
+    """Units of so many runs of each scenario."""
+    return [
+        {"scenario": name, "seed": first_seed + k} for name, n in counts.items() for k in range(n)
+    ]
 
 
 def try_out(scenario: str, seed: int) -> Outcome:
     """Make the scans, run the main job on them on one core, and judge what it asserts."""
     scene = make_scene(SCENARIOS[scenario], seed)
     names = sorted(scene.sources)
-    scans = tuple(_unplaced(name, scene) for name in names)
+    scans = tuple(_scan(name, scene) for name in names)
     pairs: tuple[PairOutcome | None, ...] = (None,) * (len(names) * (len(names) - 1) // 2)
-    verdict = reason = ""
-    start = time.process_time()
+    reason, start = "", time.process_time()
     try:
         found = run(scene.scans, CONFIG, workers=1)
         verdict, (scans, pairs) = str(found.verdict), judge(found, scene)
@@ -166,15 +74,8 @@ def try_out(scenario: str, seed: int) -> Outcome:
     except Exception:
         # A crash is what this benchmark looks for: it is kept, and the other runs go on.
         verdict, reason = CRASH, traceback.format_exc()
-    return Outcome(
-        scenario=scenario,
-        seed=seed,
-        verdict=verdict,
-        scans=scans,
-        pairs=pairs,
-        seconds=time.process_time() - start,
-        reason=reason,
-    )
+    told = {"scenario": scenario, "seed": seed, "verdict": verdict, "reason": reason}
+    return Outcome(**told, scans=scans, pairs=pairs, seconds=time.process_time() - start)
 
 
 def judge(
@@ -182,9 +83,8 @@ def judge(
 ) -> tuple[tuple[ScanOutcome, ...], tuple[PairOutcome | None, ...]]:
     """What became of every scan and every pair, in the order of their names."""
     estimate = PoseSet(poses=dict(found.poses), components=found.components)
-    errors = evaluate_poses(
-        estimate, scene.truth, centroids=scene.centroids, diameter=scene.diameter
-    )
+    truth = {"centroids": scene.centroids, "diameter": scene.diameter}
+    errors = evaluate_poses(estimate, scene.truth, **truth)
     names = sorted(scene.sources)
     reports = {(pair.i, pair.j): pair for pair in found.pairs}
     return (
@@ -203,15 +103,11 @@ def is_right_pair(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool:
     return off.angle_deg() <= PAIR_DEG and shift_percent <= PAIR_PERCENT
 
 
-def _unplaced(name: str, scene: Scene, **found: Any) -> ScanOutcome:
+def _scan(name: str, scene: Scene, **found: Any) -> ScanOutcome:
     """What a scan is, and what was found of it."""
-    return ScanOutcome(
-        source=scene.sources[name],
-        world=scene.worlds[name] if name in scene.truth else None,
-        is_open=name in scene.is_open,
-        factor=scene.factors.get(name, 1.0),
-        **found,
-    )
+    world = scene.worlds[name] if name in scene.truth else None
+    is_open, factor = name in scene.is_open, scene.factors.get(name, 1.0)
+    return ScanOutcome(scene.sources[name], world, is_open, factor, **found)
 
 
 def _scan_outcome(
@@ -228,20 +124,15 @@ def _scan_outcome(
     world = {n for n in scene.truth if scene.worlds[n] == scene.worlds[name]}
     main = max(found.components, key=lambda c: len(world & set(c)), default=())
     told["is_apart"] = name in found.poses and name not in main
-    outcome = _unplaced(name, scene, **told)
+    outcome = _scan(name, scene, **told)
     if outcome.is_good and outcome.is_right and not outcome.is_open:
         return outcome
-    reason = "; ".join([report.reason, *report.notes])[:MAX_REASON]
-    return _unplaced(name, scene, **told, reason=reason)
+    return outcome._replace(reason="; ".join([report.reason, *report.notes])[:MAX_REASON])
 
 
 def _pair_outcome(report: PairReport | None, scene: Scene) -> PairOutcome | None:
     if report is None or report.i_from_j is None:
         return None
-    return PairOutcome(
-        report.confidence,
-        report.kind,
-        report.accepted,
-        is_right_pair(report.i, report.j, report.i_from_j, scene),
-        bool({report.i, report.j} & scene.is_open),
-    )
+    is_right = is_right_pair(report.i, report.j, report.i_from_j, scene)
+    is_open = bool({report.i, report.j} & scene.is_open)
+    return PairOutcome(report.confidence, report.kind, report.accepted, is_right, is_open)

@@ -1,10 +1,10 @@
 """Open3D's ways from posed range images to a mesh, given the same scans, poses and voxels."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ POISSON_REACH_VOXELS = 2.0
 """Poisson's surface closes everything; what lies farther from all points is cut off."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Shape:
+class Shape(NamedTuple):
     """A scan's surface at full resolution, as image and as mesh with normals, sensor frame."""
 
     camera: Camera
@@ -47,21 +46,15 @@ def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
     kept, points = surface_points(scan)
     pixel = scan.resolution
     camera, depth, mesh = render_surface(kept, points, pixel, pixel, 2.0 * pixel, PrepareConfig())
-    return Shape(camera=camera, depth=depth, mesh=mesh, world_from_sensor=world_from_sensor)
+    return Shape(camera, depth, mesh, world_from_sensor)
 
 
 def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's truncated signed distances, in its grid of voxel blocks; one scan is enough."""
     library = _open3d()
     core, geometry = library.core, library.t.geometry
-    grid = geometry.VoxelBlockGrid(
-        attr_names=("tsdf", "weight"),
-        attr_dtypes=(core.float32, core.float32),
-        attr_channels=((1), (1)),
-        voxel_size=voxel,
-        block_resolution=8,
-        block_count=MAX_BLOCKS,
-    )
+    kinds = (("tsdf", "weight"), (core.float32, core.float32), ((1), (1)))
+    grid = geometry.VoxelBlockGrid(*kinds, voxel, block_resolution=8, block_count=MAX_BLOCKS)
     for shape in shapes:
         seen = _as_pinhole(shape)
         c = seen.camera
@@ -107,7 +100,7 @@ def _as_pinhole(shape: Shape) -> Shape:
     camera = replace(c, model=CameraModel.PINHOLE, fx=far * c.fx, fy=far * c.fy)
     depth, _ = render_depth(points + back, shape.mesh.faces, camera)
     moved = shape.world_from_sensor @ Pose(rotation=np.eye(3), translation=-back)
-    return replace(shape, camera=camera, depth=depth, world_from_sensor=moved)
+    return shape._replace(camera=camera, depth=depth, world_from_sensor=moved)
 
 
 def _converted(mesh: Any) -> TriangleMesh:

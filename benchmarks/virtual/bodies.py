@@ -1,8 +1,8 @@
 """Objects that are scanned: figures, made parts, plain solids, and the symmetries these have."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -23,16 +23,13 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 """Radius by turn (radians) and level (0 at the bottom, 1 at the top)."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Body:
+class Body(NamedTuple):
     """An object, standing along z."""
 
     mesh: TriangleMesh  # Faces counter-clockwise seen from outside
-    # Whether a motion leaves the object as it is: then the pose of a scan is not determined by what
-    # it shows
+    # Whether a motion leaves the object as it is: then no scan determines its own pose
     is_symmetric: bool = False
-    # The same object without the mark that alone tells it from a symmetric one; None where there is
-    # no such mark
+    # Without the mark that alone tells it from a symmetric one; None where there is no such mark
     unmarked: TriangleMesh | None = None
 
 
@@ -40,24 +37,6 @@ class Body:
 def make_body(name: str, seed: int) -> Body:
     """One of ``BODIES`` by its name, another one for every seed."""
     return BODIES[name](seed)
-
-
-def figure(seed: int) -> Body:
-    """A four-legged figure with much self-occlusion, of any proportions."""
-    mesh = creature(FIRST_CREATURE + seed, voxels=120)
-    factors = 1.0 + np.random.default_rng([seed, 5]).uniform(-0.2, 0.2, size=3)
-    return Body(mesh=TriangleMesh(vertices=mesh.vertices * factors, faces=mesh.faces))
-
-
-def mirrored_figure(seed: int) -> Body:
-    """A figure whose right side is the mirror image of its left: no motion maps it on itself."""
-    mesh, plane_y = figure(seed).mesh, 2.0
-    vertices, faces, _ = trimesh.intersections.slice_faces_plane(
-        mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]), np.array([0.0, plane_y, 0.0])
-    )
-    other = vertices * [1.0, -1.0, 1.0] + [0.0, 2 * plane_y, 0.0]
-    left = TriangleMesh(vertices=vertices, faces=faces)
-    return Body(mesh=joined(left, TriangleMesh(vertices=other, faces=faces[:, ::-1])))
 
 
 def joined(one: TriangleMesh, other: TriangleMesh) -> TriangleMesh:
@@ -78,7 +57,32 @@ def middle(mesh: TriangleMesh) -> FloatArray:
     return 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
 
 
-def vase(rng: Rng) -> Profile:
+def toothed(size: float, height: float, count: int, sharpness: float) -> Profile:
+    """A disc with teeth, or a star with arms."""
+    return lambda turn, level: (
+        size + height * np.tanh(sharpness * np.cos(count * turn)) + 0.0 * level
+    )
+
+
+def _figure(seed: int) -> Body:
+    """Four-legged, with much self-occlusion, of any proportions."""
+    mesh = creature(FIRST_CREATURE + seed, voxels=120)
+    factors = 1.0 + np.random.default_rng([seed, 5]).uniform(-0.2, 0.2, size=3)
+    return Body(TriangleMesh(vertices=mesh.vertices * factors, faces=mesh.faces))
+
+
+def _mirrored_figure(seed: int) -> Body:
+    """A figure whose right side is the mirror image of its left: no motion maps it on itself."""
+    mesh, plane_y = _figure(seed).mesh, 2.0
+    vertices, faces, _ = trimesh.intersections.slice_faces_plane(
+        mesh.vertices, mesh.faces, np.array([0.0, 1.0, 0.0]), np.array([0.0, plane_y, 0.0])
+    )
+    other = vertices * [1.0, -1.0, 1.0] + [0.0, 2 * plane_y, 0.0]
+    left = TriangleMesh(vertices=vertices, faces=faces)
+    return Body(joined(left, TriangleMesh(vertices=other, faces=faces[:, ::-1])))
+
+
+def _vase(rng: Rng) -> Profile:
     """A belly, a neck and a lip, wider or slimmer."""
     width, waves = rng.uniform(19.0, 25.0), rng.uniform(2.4, 2.8)
     return lambda turn, level: (
@@ -86,9 +90,9 @@ def vase(rng: Rng) -> Profile:
     )
 
 
-def knobbed_vase(rng: Rng) -> Profile:
+def _knobbed_vase(rng: Rng) -> Profile:
     """The same with one knob on the belly, 7 wide and 4 high where the vase's height is 100."""
-    plain = vase(rng)
+    plain = _vase(rng)
     belly = float(plain(np.zeros(1), np.full(1, 0.3))[0])
 
     def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
@@ -99,21 +103,13 @@ def knobbed_vase(rng: Rng) -> Profile:
     return radius
 
 
-def toothed(size: float, height: float, count: int, sharpness: float) -> Profile:
-    """A disc with teeth, or a star with arms."""
-    return lambda turn, level: (
-        size + height * np.tanh(sharpness * np.cos(count * turn)) + 0.0 * level
-    )
-
-
-def gear(rng: Rng) -> Profile:
-    """Twelve teeth."""
+def _gear(rng: Rng) -> Profile:
     return toothed(rng.uniform(38.0, 50.0), TOOTH_HEIGHT, 12, 4.0)
 
 
-def worn_gear(rng: Rng) -> Profile:
+def _worn_gear(rng: Rng) -> Profile:
     """The same with one tooth that is worn to half its height over its upper half."""
-    plain = gear(rng)
+    plain = _gear(rng)
 
     def radius(turn: FloatArray, level: FloatArray) -> FloatArray:
         worn = np.abs(np.angle(np.exp(1j * turn))) < np.pi / 14
@@ -127,7 +123,7 @@ def _solid(make: Callable[[Rng], TriangleMesh]) -> Callable[[int], Body]:
 
     def body(seed: int) -> Body:
         mesh = make(np.random.default_rng([seed, 6]))
-        return Body(mesh=shifted(mesh, -middle(mesh)), is_symmetric=True)
+        return Body(shifted(mesh, -middle(mesh)), is_symmetric=True)
 
     return body
 
@@ -138,20 +134,19 @@ def _marked(
     """A solid of revolution with a mark, and the same without it."""
 
     def body(seed: int) -> Body:
-        without, mesh = (
-            lathe(profile(np.random.default_rng([seed, 6])), height) for profile in (plain, marked)
-        )
+        profiles = (make(np.random.default_rng([seed, 6])) for make in (plain, marked))
+        without, mesh = (lathe(profile, height) for profile in profiles)
         centre = middle(without)
-        return Body(mesh=shifted(mesh, -centre), unmarked=shifted(without, -centre))
+        return Body(shifted(mesh, -centre), unmarked=shifted(without, -centre))
 
     return body
 
 
 BODIES: dict[str, Callable[[int], Body]] = {
     # Without symmetry: figures and made parts by turns, and the other sort of the two.
-    "thing": lambda seed: Body(mesh=bracket(seed)) if seed % 2 else figure(seed),
-    "other thing": lambda seed: figure(seed) if seed % 2 else Body(mesh=bracket(seed)),
-    "mirror figure": mirrored_figure,
+    "thing": lambda seed: Body(bracket(seed)) if seed % 2 else _figure(seed),
+    "other thing": lambda seed: _figure(seed) if seed % 2 else Body(bracket(seed)),
+    "mirror figure": _mirrored_figure,
     "sphere": _solid(lambda rng: sphere()),
     "cylinder": _solid(lambda rng: cylinder(rng.uniform(22, 40))),
     "cone": _solid(
@@ -159,8 +154,8 @@ BODIES: dict[str, Callable[[int], Body]] = {
     ),
     "box": _solid(lambda rng: box(*rng.uniform([50, 72, 95], [65, 88, 115]))),
     "plate": _solid(lambda rng: plate(100.0, rng.uniform(60, 85))),
-    "vase": _solid(lambda rng: lathe(vase(rng))),
-    "gear": _solid(lambda rng: lathe(gear(rng), 25.0)),
-    "marked vase": _marked(vase, knobbed_vase, 100.0),
-    "marked gear": _marked(gear, worn_gear, 25.0),
+    "vase": _solid(lambda rng: lathe(_vase(rng))),
+    "gear": _solid(lambda rng: lathe(_gear(rng), 25.0)),
+    "marked vase": _marked(_vase, _knobbed_vase, 100.0),
+    "marked gear": _marked(_gear, _worn_gear, 25.0),
 }

@@ -16,12 +16,7 @@ Rng = np.random.Generator
 
 
 def bracket(seed: int, *, voxels: int = 110) -> TriangleMesh:
-    """A part without symmetry as a closed mesh, its plate across z, made anew for every seed.
-
-    Args:
-        seed: Of the parts, their places and sizes.
-        voxels: Across the longest side.
-    """
+    """A part without symmetry as a closed mesh, its plate across z, made anew for every seed."""
     rng = np.random.default_rng([seed, 77])
     half = HALF_LENGTH * np.array([1.0, rng.uniform(0.55, 0.75), rng.uniform(0.1, 0.16)])
     reach = HALF_LENGTH * 1.55
@@ -40,10 +35,8 @@ def bracket(seed: int, *, voxels: int = 110) -> TriangleMesh:
     field[np.abs(field) < 1e-3 * step] = 1e-3 * step
     vertices, faces, _, _ = marching_cubes(field, 0.0, spacing=(step, step, step))
     body = pieces(faces, len(vertices))
-    largest = np.argmax(np.bincount(body))
-    vertices, faces, _ = compact(
-        vertices.astype(np.float64) - reach, faces[body[faces[:, 0]] == largest]
-    )
+    is_largest = body[faces[:, 0]] == np.argmax(np.bincount(body))
+    vertices, faces, _ = compact(vertices.astype(np.float64) - reach, faces[is_largest])
     return TriangleMesh(vertices=vertices, faces=faces)
 
 

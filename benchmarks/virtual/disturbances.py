@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
-from benchmarks.virtual.bodies import make_body
-from benchmarks.virtual.shots import SLIGHT, Rng, Shot, Views, ring, take_shots
+from benchmarks.virtual.bodies import Rng, make_body
+from benchmarks.virtual.shots import SLIGHT, Shot, Views, ring, take_shots
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.grid import grid_faces
 from scanweld.geometry.pose import Pose, random_rotation
@@ -41,18 +41,18 @@ def each(change: Callable[..., RangeScan], **settings: float) -> Disturbance:
 
 def outlier_points(scan: RangeScan, rng: Rng, share: float) -> RangeScan:
     """Pixels whose depth is drawn anew from a wider range than the object's."""
-    depth = depth_of(scan)
+    depth = _depth_of(scan)
     seen = np.isfinite(depth)
     low, high = depth[seen].min(), depth[seen].max()
     slack = 0.2 * (high - low)
     hit = seen & (rng.random(depth.shape) < share)
     depth[hit] = rng.uniform(low - slack, high + slack, size=int(hit.sum()))
-    return with_depth(scan, depth)
+    return _with_depth(scan, depth)
 
 
 def flying_pixels(scan: RangeScan, rng: Rng) -> RangeScan:
     """Pixels beside a jump, and beside the silhouette, measured somewhere in between."""
-    depth, size = depth_of(scan), principal_diameter(scan.points)
+    depth, size = _depth_of(scan), principal_diameter(scan.points)
     seen = np.isfinite(depth)
     # A lost return is a gap in the surface, not a look past it.
     is_past = np.logical_not(ndimage.binary_closing(seen, np.ones((3, 3))))
@@ -63,28 +63,25 @@ def flying_pixels(scan: RangeScan, rng: Rng) -> RangeScan:
     chosen = beside & (rng.random(depth.shape) < FLYING_SHARE)
     part = rng.random(int(chosen.sum()))
     depth[chosen] = near[chosen] + part * (far - near)[chosen]
-    return with_depth(scan, depth)
+    return _with_depth(scan, depth)
 
 
 def scaled(shots: list[Shot], rng: Rng, factor: float) -> list[Shot]:
     """The first scan is too large, as from a sensor whose ranges are all too long."""
-    shot = shots[0]
+    shot = shots[0].named(f"{shots[0].scan.name} scaled")
     # Where it fits best, its middle comes to lie where it belongs.
     shift = (1.0 - factor) * shot.scan.points.mean(axis=0)
     pose = shot.pose @ Pose(rotation=np.eye(3), translation=shift)
     larger = replace(shot.scan, points=factor * shot.scan.points)
-    moved = replace(shot, scan=larger, factor=factor, world_from_sensor=pose)
-    return [moved.named(f"{shot.scan.name} scaled"), *shots[1:]]
+    return [replace(shot, scan=larger, factor=factor, world_from_sensor=pose), *shots[1:]]
 
 
 def mirrored(shots: list[Shot], rng: Rng) -> list[Shot]:
     """The first scan has left-handed axes, as from a file with one axis the other way."""
     scan = shots[0].scan
-    other = RangeScan(
-        name=f"{scan.name} mirrored",
-        points=scan.points * np.array([-1.0, 1.0, 1.0]),
-        grid=None if scan.grid is None else scan.grid[:, ::-1],
-    )
+    points = scan.points * np.array([-1.0, 1.0, 1.0])
+    grid = None if scan.grid is None else scan.grid[:, ::-1]
+    other = RangeScan(name=f"{scan.name} mirrored", points=points, grid=grid)
     return [Shot(scan=other, world_from_sensor=None), *shots[1:]]
 
 
@@ -126,11 +123,9 @@ def crop_to_window(scan: RangeScan, rng: Rng, share: float) -> RangeScan:
         line = np.flatnonzero((scan.grid >= 0).any(axis=axis))
         sizes.append(int(share * len(line)))
         starts.append(int(line[0] + rng.integers(len(line) - sizes[-1] + 1)))
-    (top, left), (height, width) = starts, sizes
+    (top, left), (height, width), c = starts, sizes, scan.camera
     grid = scan.grid[top : top + height, left : left + width]
-    camera = replace(
-        scan.camera, width=width, height=height, cx=scan.camera.cx - left, cy=scan.camera.cy - top
-    )
+    camera = replace(c, width=width, height=height, cx=c.cx - left, cy=c.cy - top)
     kept = np.zeros(len(scan.points), dtype=bool)
     kept[grid[grid >= 0]] = True
     return replace(replace(scan, grid=grid).only(kept), camera=camera)
@@ -176,12 +171,12 @@ def half_of(seed: int, rng: Rng, *, body: str, views: Views, seeds_on: int = 0) 
 def noise_scan(seed: int, rng: Rng) -> list[Shot]:
     """One scan of nothing but noise in the middle of the image."""
     scan = _shots_of("thing", seed, lambda b, r: ring(b, r, count=1), rng)[0].scan
-    depth = depth_of(scan)
+    depth = _depth_of(scan)
     rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
     half = 0.5 * np.array(depth.shape)
     disc = np.hypot(rows - half[0], columns - half[1]) < NOISE_RADIUS * min(depth.shape)
     drawn = rng.uniform(np.nanmin(depth), np.nanmax(depth), size=depth.shape)
-    noise = with_depth(scan, np.where(disc, drawn, np.nan))
+    noise = _with_depth(scan, np.where(disc, drawn, np.nan))
     return [Shot(scan=replace(noise, name="noise"), world_from_sensor=None)]
 
 
@@ -196,13 +191,13 @@ def _shots_of(name: str, seed: int, views: Views, rng: Rng) -> list[Shot]:
     return [shot.named(f"other {shot.scan.name}") for shot in shots]
 
 
-def depth_of(scan: RangeScan) -> FloatArray:
+def _depth_of(scan: RangeScan) -> FloatArray:
     """Depth (H, W) of a scan in its sensor's frame, NaN where nothing was seen."""
     assert scan.grid is not None
     return np.where(scan.grid >= 0, scan.points[scan.grid, 2], np.nan)
 
 
-def with_depth(scan: RangeScan, depth: FloatArray) -> RangeScan:
+def _with_depth(scan: RangeScan, depth: FloatArray) -> RangeScan:
     """The scan with other depths (H, W), NaN for none."""
     assert scan.camera is not None
     seen = np.isfinite(depth)

@@ -48,8 +48,7 @@ class Scenario:
     taking: Taking = take_shots  # What else is in front of the sensor
     noise: NoiseModel = SLIGHT  # What the sensor does to depth
     crop: Disturbance | None = None  # What is cut off the scans
-    # What happens to the scans after that, one after the other
-    disturbances: tuple[Disturbance, ...] = ()
+    disturbances: tuple[Disturbance, ...] = ()  # What happens to them after that, one by one
     strangers: Strangers | None = None  # Scans that are added
     # Of the pairs that connect all scans of the object; views are drawn anew until this holds
     min_overlap: float = CHAIN_OVERLAP
@@ -120,8 +119,8 @@ def with_mark_seen(
     """The shots, each knowing whether it shows the mark, if there is one."""
     if body.unmarked is None:
         return shots
-    seen = [count >= min_pixels for count in mark_pixels(body, views)]
-    return [replace(shot, sees_mark=sees) for shot, sees in zip(shots, seen, strict=True)]
+    counted = zip(shots, mark_pixels(body, views), strict=True)
+    return [replace(shot, sees_mark=count >= min_pixels) for shot, count in counted]
 
 
 def _shows(body: Body, views: Sequence[View]) -> bool:
@@ -134,25 +133,23 @@ def _shows(body: Body, views: Sequence[View]) -> bool:
 
 
 def _cropped(scenario: Scenario, shots: list[Shot], seed: int, draw: int) -> list[Shot]:
-    if scenario.crop is None:
-        return shots
-    return scenario.crop(shots, np.random.default_rng([seed, 3, draw]))
+    rng = np.random.default_rng([seed, 3, draw])
+    return scenario.crop(shots, rng) if scenario.crop else shots
 
 
 def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scene:
     """Shuffle, rename, and move every scan into a random frame."""
     rng = np.random.default_rng([seed, 2])
-    of: dict[str, Shot] = {}
+    order = enumerate(rng.permutation(len(shots)), start=1)
+    of = {f"scan_{number:02d}": shots[k] for number, k in order}
     scans: list[RangeScan] = []
     truth: dict[str, Pose] = {}
-    for number, k in enumerate(rng.permutation(len(shots)), start=1):
-        shot, name = shots[k], f"scan_{number:02d}"
-        shift = 2 * diameter
-        motion = Pose(rotation=random_rotation(rng), translation=rng.uniform(-shift, shift, size=3))
+    for name, shot in of.items():
+        turn, reach = random_rotation(rng), 2 * diameter
+        motion = Pose(rotation=turn, translation=rng.uniform(-reach, reach, size=3))
         points, sensor = motion.apply(shot.scan.points), shot.scan.scan_from_sensor
         sensor = None if sensor is None else motion @ sensor
         scans.append(replace(shot.scan, name=name, points=points, scan_from_sensor=sensor))
-        of[name] = shot
         if shot.world_from_sensor is not None:
             truth[name] = shot.world_from_sensor @ motion.inverse()
     is_open = {n for n, s in of.items() if (body.is_symmetric or not s.sees_mark) and s.world == 0}

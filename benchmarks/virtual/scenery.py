@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from benchmarks.virtual.bodies import Body, joined, middle, shifted
-from benchmarks.virtual.shots import Rng, Shot, Views, take
+from benchmarks.virtual.bodies import Body, Rng, joined, middle, shifted
+from benchmarks.virtual.shots import Shot, Views, take
 from scanweld.evaluation.primitives import cylinder
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import View
@@ -26,6 +26,8 @@ OVER = rotation_exp(np.radians(100.0) * np.array([0.94, 0.34, 0.0]))
 """How the object is turned over by hand."""
 ARM_DIAMETERS = np.geomspace(0.02, 0.14, 9)
 """Radii of arms to choose from."""
+NUM_HELD, HAND = 2, 0.1
+"""Views with an arm, evenly among all, and the share of what the sensor sees there that it is."""
 FIST = 1.6
 """Its radius, in radii of the arm."""
 TOWARDS = -0.2
@@ -51,7 +53,7 @@ def turned_over(body: Body, rng: Rng, *, half: Views) -> list[View]:
     """Views of the object as it stands, and then as it lies, in the frame of the object."""
     lying = TriangleMesh(vertices=body.mesh.vertices @ OVER.T, faces=body.mesh.faces)
     back = Pose(rotation=OVER.T, translation=np.zeros(3))
-    after = half(Body(mesh=lying), rng)
+    after = half(Body(lying), rng)
     return half(body, rng) + [
         replace(view, world_from_sensor=back @ view.world_from_sensor) for view in after
     ]
@@ -64,27 +66,16 @@ def on_table_turned_over(body: Body, views: list[View], noise: NoiseModel, seed:
     return _take_beside(body, under, views, noise, seed)
 
 
-def held_by_hand(
-    body: Body, views: list[View], noise: NoiseModel, seed: int, count: int = 2, share: float = 0.1
-) -> list[Shot]:
-    """In some views an arm reaches into the image and holds the object, elsewhere each time.
-
-    Args:
-        body: What is held.
-        views: All views.
-        noise: What the sensor does to depth.
-        seed: Of the noise and of the arms.
-        count: Views with an arm, evenly among all.
-        share: Of what the sensor sees there that is the arm.
-    """
+def held_by_hand(body: Body, views: list[View], noise: NoiseModel, seed: int) -> list[Shot]:
+    """In two views an arm reaches into the image and holds the object, elsewhere each time."""
     rng = np.random.default_rng([seed, 4])
-    held = {k * len(views) // count for k in range(count)}
-    arms = [_arm(body, view, share, rng) if k in held else None for k, view in enumerate(views)]
+    held = {k * len(views) // NUM_HELD for k in range(NUM_HELD)}
+    arms = [_arm(body, view, rng) if k in held else None for k, view in enumerate(views)]
     shots = _take_beside(body, arms, views, noise, seed)
     return [s.named(f"{k} held") if k in held else s for k, s in enumerate(shots)]
 
 
-def share_beside(body: Body, scenery: TriangleMesh, view: View) -> float:
+def _share_beside(body: Body, scenery: TriangleMesh, view: View) -> float:
     """Share of what a view sees that is not the object."""
     both = joined(body.mesh, scenery)
     vertices = view.world_from_sensor.inverse().apply(both.vertices)
@@ -95,7 +86,7 @@ def share_beside(body: Body, scenery: TriangleMesh, view: View) -> float:
 def _take_beside(
     body: Body,
     sceneries: Sequence[TriangleMesh | None],
-    views: Sequence[View],
+    views: list[View],
     noise: NoiseModel,
     seed: int,
 ) -> list[Shot]:
@@ -130,7 +121,7 @@ def _table(body: Body, up: FloatArray) -> TriangleMesh:
     return TriangleMesh(vertices=square, faces=np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def _arm(body: Body, view: View, share: float, rng: Rng) -> TriangleMesh:
+def _arm(body: Body, view: View, rng: Rng) -> TriangleMesh:
     """A fist at a place of the object near its outline, and an arm out of the image."""
     size = principal_diameter(body.mesh.vertices)
     vertices = view.world_from_sensor.inverse().apply(body.mesh.vertices)
@@ -143,7 +134,7 @@ def _arm(body: Body, view: View, share: float, rng: Rng) -> TriangleMesh:
     direction = np.array([*outwards[spot] / aside, TOWARDS]) / np.hypot(1.0, TOWARDS)
     start, along = view.world_from_sensor.apply(seen[spot]), view.world_from_sensor.turn(direction)
     arms = [_arm_along(start, along, radius * size, 1.2 * size) for radius in ARM_DIAMETERS]
-    off = [abs(share_beside(body, arm, _wider(view)) - share) for arm in arms]
+    off = [abs(_share_beside(body, arm, _wider(view)) - HAND) for arm in arms]
     return arms[int(np.argmin(off))]
 
 

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from benchmarks.virtual.bodies import Body, middle
+from benchmarks.virtual.bodies import Body, Rng, middle
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, camera_axes, view_along, view_of
 from scanweld.geometry.arrays import BoolArray, FloatArray
@@ -26,7 +26,6 @@ OVERLAP_SAMPLES = 1500
 OVERLAP_SPACINGS = 1.5
 """A point that is as near to another scan, in that scan's point spacings, lies on it."""
 
-Rng = np.random.Generator
 Views = Callable[[Body, Rng], list[View]]
 """Where a body is scanned from: one of the functions below, its settings bound."""
 
@@ -72,10 +71,9 @@ def take_shots(body: Body, views: list[View], noise: NoiseModel, seed: int) -> l
 
 def take(mesh: TriangleMesh, view: View, noise: NoiseModel, seed: int, number: int) -> Shot:
     """One scan, in its sensor's frame."""
-    scan = scan_mesh(
-        mesh, view.camera, view.world_from_sensor, noise, 1000 * seed + number, name=f"{number}"
-    )
-    return Shot(scan=scan, world_from_sensor=view.world_from_sensor)
+    pose = view.world_from_sensor
+    scan = scan_mesh(mesh, view.camera, pose, noise, 1000 * seed + number, name=f"{number}")
+    return Shot(scan=scan, world_from_sensor=pose)
 
 
 def ring(
@@ -89,41 +87,30 @@ def ring(
     **lens: CameraModel | float,
 ) -> list[View]:
     """Views around the object, by turns from a little above and below, the sensor rolled."""
-    step = 360.0 / count if step_deg is None else step_deg
-    jitter = rng.uniform(-JITTER_DEG, JITTER_DEG, size=(count, 2))
-    return [
-        view_along(
-            body.mesh,
-            camera_axes(
-                step * k + jitter[k, 0],
-                elevations_deg[k % len(elevations_deg)] + jitter[k, 1],
-                rng.uniform(-180, 180),
-            ),
-            pixels=pixels[k % len(pixels)],
-            **lens,  # type: ignore[arg-type]  # model and distance_diameters
-        )
-        for k in range(count)
-    ]
+    step, views = 360.0 / count if step_deg is None else step_deg, []
+    for k, (aside, up) in enumerate(rng.uniform(-JITTER_DEG, JITTER_DEG, size=(count, 2))):
+        elevation = elevations_deg[k % len(elevations_deg)] + up
+        axes = camera_axes(step * k + aside, elevation, rng.uniform(-180, 180))
+        across = pixels[k % len(pixels)]
+        views.append(view_along(body.mesh, axes, pixels=across, **lens))  # type: ignore[arg-type]
+    return views
 
 
 def on_sphere(body: Body, rng: Rng, *, count: int) -> list[View]:
     """Views from directions drawn evenly from the sphere."""
-    return [
-        view_of(
-            body.mesh,
-            rng.uniform(0, 360),
-            float(np.degrees(np.arcsin(rng.uniform(-1, 1)))),
-            rng.uniform(-180, 180),
-            pixels=PIXELS,
+    views = []
+    for _ in range(count):
+        azimuth, height, roll = (
+            rng.uniform(*limits) for limits in ((0, 360), (-1, 1), (-180, 180))
         )
-        for _ in range(count)
-    ]
+        elevation = float(np.degrees(np.arcsin(height)))
+        views.append(view_of(body.mesh, azimuth, elevation, roll, pixels=PIXELS))
+    return views
 
 
 def twice(body: Body, rng: Rng, *, views: Views, count: int, apart_deg: float) -> list[View]:
     """Views, and the first of them again, each turned a little about the object's middle."""
-    centre, found = middle(body.mesh), views(body, rng)
-    beside = []
+    centre, found, beside = middle(body.mesh), views(body, rng), []
     for view in found[:count]:
         axis = rng.normal(size=3)
         turn = rotation_exp(np.radians(apart_deg) * axis / np.linalg.norm(axis))
@@ -143,8 +130,7 @@ def shot_overlaps(shots: Sequence[Shot]) -> FloatArray:
     trees = [KDTree(shot.world_points) for shot in shots]
     few = [tree.data[:: max(1, tree.n // OVERLAP_SAMPLES)] for tree in trees]
     spacing = [np.median(t.query(own, k=2)[0][:, 1]) for t, own in zip(trees, few, strict=True)]
-    reach = OVERLAP_SPACINGS * np.array(spacing)
-    shares = np.array(
-        [[(t.query(own)[0] < r).mean() for t, r in zip(trees, reach, strict=True)] for own in few]
-    )
+    reaches = OVERLAP_SPACINGS * np.array(spacing)
+    ends = list(zip(trees, reaches, strict=True))
+    shares = np.array([[(tree.query(own)[0] < r).mean() for tree, r in ends] for own in few])
     return np.minimum(shares, shares.T)

@@ -4,15 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import trimesh
 
+from benchmarks.blocks import rendered
 from benchmarks.calibration.collect import NUM_SETS, Sets
-from benchmarks.calibration.fit import count_frequencies, fit, held_out_probabilities, make_examples
+from benchmarks.calibration.fit import Examples, count_frequencies, fit, held_out_probabilities
 from benchmarks.calibration.learn import learn
 from benchmarks.calibration.report import calibration_told, measures
 from benchmarks.calibration.scenes import OTHER, make_set
 from benchmarks.calibration.solids import SOLIDS
 from benchmarks.judging.other_tools import OtherTools
-from benchmarks.judging.runs import Runs
+from benchmarks.judging.trial import Runs
 from benchmarks.kept import Record
 from benchmarks.scores import Stated
 from benchmarks.seeds import spent_among
@@ -25,14 +27,12 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 @pytest.mark.parametrize("make", SOLIDS, ids=lambda make: make.__name__)
 def test_solids_face_outwards_and_differ_by_seed(make: Callable[[np.random.Generator], Body]):
     a, b, again = (make(np.random.default_rng([seed, 7])).mesh for seed in (0, 1, 0))
-    corners = a.vertices[a.faces]
-    volume = np.einsum("nk,nk->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
-    assert volume > 1000
+    assert trimesh.Trimesh(a.vertices, a.faces, process=False).volume > 1000
     assert a.vertices.shape != b.vertices.shape or not np.allclose(a.vertices, b.vertices)
     assert again.vertices.tobytes() == a.vertices.tobytes()
 
 
-def test_scenes_repeat_themselves():
+def test_sets_repeat_themselves():
     a, b = make_set(3), make_set(3)
     assert [scan.points.tobytes() for scan in a.scans] == [s.points.tobytes() for s in b.scans]
     assert 3 <= len(a.scans) <= 6 and sum(SOLIDS.values()) == pytest.approx(1)
@@ -58,7 +58,7 @@ def known(count: int, seed: int) -> tuple[list[dict[str, float]], FloatArray, Bo
 
 def test_the_fit_finds_probabilities_that_are_known():
     rows, _, is_right = known(4000, 0)
-    model = fit(make_examples(rows, is_right.tolist(), list(range(4000))))
+    model = fit(Examples.of(rows, is_right.tolist(), list(range(4000))))
     seen, probability, came = known(4000, 1)
     said = np.array([model.probability(row) for row in seen])
     # What tells the wrong way cannot be used: a model must not doubt what looks better.
@@ -74,7 +74,7 @@ def test_held_out_probabilities_know_nothing_of_their_set():
     groups = np.repeat(np.arange(40), 10)
     is_right = (rng.random(40) < 0.5)[groups]
     rows = [{"number": float(g), "noise": float(rng.normal())} for g in groups]
-    said = held_out_probabilities(make_examples(rows, is_right.tolist(), groups.tolist()))
+    said = held_out_probabilities(Examples.of(rows, is_right.tolist(), groups.tolist()))
     assert Stated(said, is_right).auc < 0.65
 
 
@@ -90,38 +90,27 @@ def test_few_examples_do_not_make_certain():
 def made_record(seed: int) -> Record:
     """A set of three scans: two pairs right, one wrong; or of a stranger, all wrong."""
     rng = np.random.default_rng(seed)
-    is_right = bool(rng.random() < 0.6)
-    pairs = [
-        {
-            **{"i": i, "j": j, "kind": "good", "observability": 1.0, "accepted": k < 2},
-            "grounds": {"agree": float(rng.normal(2.0 * (k < 2 and is_right))), "support": 0.0},
-            "right": bool(k < 2 and is_right),
-        }
-        for k, (i, j) in enumerate((("a", "b"), ("b", "c"), ("a", "c")))
-    ]
-    scans = [
-        {
-            **{"name": name, "component": 0, "reference": name == "b"},
-            "grounds": {
-                "agree": float(rng.normal(2.0 * is_right)),
-                **{"margin": 1.0, "observability": -1.0, "link": 0.0},
-            },
-            "right": is_right,
-        }
-        for name in "abc"
-    ]
+    is_right, pairs, scans = bool(rng.random() < 0.6), [], []
+    for k, edge in enumerate(("ab", "bc", "ac")):
+        grounds = {"agree": float(rng.normal(2.0 * (k < 2 and is_right))), "support": 0.0}
+        told = {"kind": "good", "observability": 1.0, "accepted": k < 2, "grounds": grounds}
+        pairs.append({"i": edge[0], "j": edge[1], "right": bool(k < 2 and is_right), **told})
+    for name in "abc":
+        grounds = {"agree": float(rng.normal(2.0 * is_right)), "margin": 1.0, "link": 0.0}
+        told = {"component": 0, "reference": name == "b", "right": is_right}
+        scans.append({"name": name, **told, "grounds": {**grounds, "observability": -1.0}})
     return Record(unit={"seed": seed}, result={"pairs": pairs, "scans": scans})
 
 
 def test_scans_learn_from_the_confidence_of_their_pairs():
     learned = learn([made_record(seed) for seed in range(150)], "the command")
-    assert len(learned.pairs) == len(learned.scans) == 450
+    assert len(learned.pairs.groups) == len(learned.scans.groups) == 450
     links = learned.scans.grounds[:, learned.scans.names.index("link")]
     assert links[learned.scans.is_right].mean() > links[~learned.scans.is_right].mean() + 0.3
     assert learned.stated_pairs.auc > 0.85
     assert learned.stated_scans.auc > 0.9
     again = read_calibration(learned.calibration.to_json())
     assert again.made["sets"] == 150 and again.made["command"] == "the command"
-    text = calibration_told(measures(learned))
+    text = rendered("calibration", **calibration_told(measures(learned)))
     assert "`the command`" in text and "150 sets" in text
     assert "Of the pairs have a confidence from 0.5 on" in text

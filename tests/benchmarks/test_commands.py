@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 from benchmarks import kept, keypoints, model, pairs, run, trust
+from benchmarks.blocks import rendered
 from benchmarks.calibration import __main__ as calibration
 from benchmarks.compare import difference
-from benchmarks.kept import Kept, Result, Study, Unit, code_digest, warn_of_old_calibration
+from benchmarks.judging import trial
+from benchmarks.judging.page import seeds_of
+from benchmarks.kept import Study, Unit, code_digest, warn_of_old_calibration
 from benchmarks.results import ROOT, read_results, write_results
-from benchmarks.seeds import FIRST_FRESH, PAGE, read_ledger, seeds_told, spent_among
+from benchmarks.seeds import FIRST_FRESH, PAGE, read_ledger, spent_among
 from benchmarks.sets import SETS, make_set, moved_scans
 from scanweld.confidence.model import read_calibration, stored_calibration
 from scanweld.errors import InputError
@@ -48,9 +51,9 @@ def test_sets_run_quickly(command: Command, tmp_path: Path, capfd: pytest.Captur
 def test_pairs_run_quickly(command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     out, plot = tmp_path / "pairs.json", tmp_path / "pairs.png"
     assert command(pairs, "--quick", "--workers", 1, "--out", out, "--plot", plot) == 0
-    answers = [pairs.Answer(**record) for record in read_results(out)["records"]]
-    assert len(answers) == 3 and sum(a.is_right for a in answers) >= 2 and plot.exists()
-    assert not any(a.kind == "good" and not a.is_right for a in answers)
+    answers = read_results(out)["records"]
+    assert len(answers) == 3 and sum(a["rank"] == 1 for a in answers) >= 2 and plot.exists()
+    assert not any(a["kind"] == "good" and a["rank"] != 1 for a in answers)
     assert "| mixed | 0.15-1.00 |" in capsys.readouterr().out
 
 
@@ -83,7 +86,7 @@ def test_trust_runs_quickly_and_not_again(
     assert page.count("Not measured yet.") == 2
     document = read_results(tmp_path / "docs/data/trust.json")
     assert document["code"] == code_digest(kept.TRUSTED)
-    monkeypatch.setattr("benchmarks.judging.runs.try_out", lambda *_: pytest.fail("run again"))
+    monkeypatch.setattr("benchmarks.judging.trial.try_out", lambda *_: pytest.fail("run again"))
     command(trust, *options)
     assert (tmp_path / "docs/trust.md").read_text(encoding="utf-8") == page
     # The same seeds for other code: they have been looked at.
@@ -105,21 +108,17 @@ def test_calibration_runs_quickly(
 
 
 def test_an_old_calibration_is_told_of_in_one_line(caplog: pytest.LogCaptureFixture):
-    made = dict(stored_calibration().made)
     text = json.loads(kept.CALIBRATION.read_text(encoding="utf-8"))
-    for code in ({}, {"code": "0123456789abcdef"}):
-        caplog.clear()
-        text["made"] = {**made, **code}
-        assert warn_of_old_calibration(read_calibration(json.dumps(text)))
-        (record,) = caplog.records
-        assert "older code" in record.message and "\n" not in record.message
+    text["made"] = {**stored_calibration().made, "code": "0123456789abcdef"}
+    assert warn_of_old_calibration(read_calibration(json.dumps(text)))
+    (record,) = caplog.records
+    assert "older code" in record.message and "\n" not in record.message
 
 
-def test_digests_know_of_all_code_and_of_the_calibration(monkeypatch: pytest.MonkeyPatch):
+def test_digests_know_of_all_code_and_of_the_calibration():
     for patterns in (kept.CALIBRATED, kept.COLLECTED, kept.COMPARED, kept.TRUSTED):
         assert code_digest(patterns)
-    found = {path for pattern in kept.TRUSTED for path in ROOT.glob(pattern)}
-    assert kept.CALIBRATION in found and not kept.CALIBRATION.match(*kept.COLLECTED[:1])
+    assert kept.CALIBRATION in {path for pattern in kept.TRUSTED for path in ROOT.glob(pattern)}
     with pytest.raises(ValueError, match="moved"):
         code_digest(("src/scanweld/moved/*.py",))
 
@@ -127,29 +126,19 @@ def test_digests_know_of_all_code_and_of_the_calibration(monkeypatch: pytest.Mon
 def test_a_recalibration_makes_kept_runs_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for module in ("benchmarks.kept.ROOT", "benchmarks.study.study._ROOT"):
         monkeypatch.setattr(module, tmp_path)
-    for name in ("src/scanweld/a.py", "src/scanweld/confidence/calibration.json"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("1")
-    measured: list[int] = []
-
-    class One(Kept):
-        NAME: str = "one"
-        TITLE: str = "One"
-
-        def units(self, quick: bool) -> list[Unit]:
-            return [{"seed": 1}]
-
-        def measure(self, unit: Unit) -> Result:
-            measured.append(1)
-            return {}
-
+    text = tmp_path / "src/scanweld/confidence/calibration.json"
+    text.parent.mkdir(parents=True)
+    (tmp_path / "src/scanweld/a.py").write_text("1")
+    made: list[Unit] = []
+    runs = trial.Runs(scenarios=("hand",), seeds=1)
+    monkeypatch.setattr(trial.Runs, "measure", lambda self, unit: made.append(unit) or {})
     study = Study(
         out=tmp_path, work=tmp_path, workers=1, quick=False, command="", code=kept.TRUSTED
     )
-    for text, count in (("1", 1), ("1", 1), ("2", 2)):
-        (tmp_path / "src/scanweld/confidence/calibration.json").write_text(text)
-        kept.measured(One(), study)
-        assert len(measured) == count
+    for content, count in (("1", 1), ("1", 1), ("2", 2)):
+        text.write_text(content)
+        kept.measured(runs, study)
+        assert len(made) == count
 
 
 def test_results_say_what_measured_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -165,7 +154,7 @@ def test_the_ledger_has_what_was_spent():
     for seed in (0, 199, 511, 1011, 2000, 2999, 7000, 7001, 7101, 7102, 500_000, 500_199):
         assert spent_among([seed]), seed
     assert not spent_among([*range(FIRST_FRESH, FIRST_FRESH + 1000), 7002, 7100])
-    told = seeds_told([2000, 2011])
+    told = rendered("trust-seeds", **seeds_of([2000, 2011]))
     assert "**They are spent**" in told and "41 of 48" in told and "1 of 422" in told
     with pytest.raises(ValueError, match="not a row"):
         read_ledger(PAGE.read_text(encoding="utf-8") + "\n| about 12 | tests | then | |\n")
@@ -177,28 +166,21 @@ def a_run(seed: int, **changes: Any) -> dict[str, Any]:
     return {**told, **errors, "seconds": 10.0, "cpu_seconds": 15.0, "peak_mb": 500.0, **changes}
 
 
-def test_floors_that_are_met():
-    runs = [a_run(0), a_run(1, rotation_max=0.4), a_run(2)]
+def set_table(*runs: dict[str, Any]) -> str:
+    return rendered("sets", **run.over_seeds(runs))
+
+
+def test_one_bad_seed_fails_the_set():
+    runs = a_run(0), a_run(1, rotation_max=0.4), a_run(2)
     assert all(SETS["bunny4"].is_met(each) for each in runs)
-    table = run.table(runs)
+    table = set_table(*runs)
     assert "| bunny4 | 3 | 4/4 | 0 | 0.100 (0.5) | 0.400 (1) |" in table and "FAIL" not in table
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [{"right": 3}, {"wrong": 1}, {"rotation_max": 1.1}, {"translation_max": 1.1}],
-    ids=str,
-)
-def test_one_bad_seed_fails_the_set(changes: dict[str, float]):
-    assert not SETS["bunny4"].is_met(a_run(1, **changes))
-    assert run.table([a_run(0), a_run(1, **changes), a_run(2)]).count("FAIL") == 1
-
-
-def test_a_failed_run_has_no_errors_and_fails():
-    nothing = dict.fromkeys(SETS["bunny4"].floors)
-    failed = a_run(0, right=0, verdict="error", **nothing)
-    assert not SETS["bunny4"].is_met(failed)
-    assert "**0/4 FAIL**" in run.table([failed])
+    for change in ({"right": 3}, {"wrong": 1}, {"rotation_max": 1.1}, {"translation_max": 1.1}):
+        bad = a_run(1, **change)
+        assert not SETS["bunny4"].is_met(bad)
+        assert set_table(a_run(0), bad, a_run(2)).count("FAIL") == 1
+    failed = a_run(0, right=0, verdict="error", **dict.fromkeys(SETS["bunny4"].floors))
+    assert not SETS["bunny4"].is_met(failed) and "**0/4 FAIL**" in set_table(failed)
 
 
 def test_paired_differences():
@@ -207,18 +189,16 @@ def test_paired_differences():
 
 
 def test_floors_of_pairs():
-    def answer(score: float, rank: int | None) -> pairs.Answer:
-        return pairs.Answer(
-            anchors="mixed", object="o", seed=0, i="i", j="j", overlap=0.2, gap_deg=30.0,
-            kind="good", rotation_deg=0.0, translation_percent=0.0, score=score, evidence={},
-            margin=1.0, observability=1.0, rank=rank, seconds=0.1,
-        )  # fmt: skip
+    def answer(score: float, rank: int | None) -> dict[str, Any]:
+        errors = dict(rotation_deg=0.0, translation_percent=0.0, score=score, rank=rank)
+        return {"anchors": "mixed", "overlap": 0.2, "kind": "good", "seconds": 0.1, **errors}
 
     answers = [answer(0.9, 1), answer(0.4, 1), answer(0.5, None), answer(0.1, None)]
-    assert pairs.aucs(answers)["mixed"] == pytest.approx(0.75)
-    assert np.isnan(pairs.aucs(answers[:2])["mixed"])
+    assert pairs.over_pairs(answers)["aucs"]["mixed"] == pytest.approx(0.75)
+    assert np.isnan(pairs.over_pairs(answers[:2])["aucs"]["mixed"])
     good = [*(answer(0.9, 1) for _ in range(19)), answer(0.1, None)]
-    assert pairs.are_floors_met(good) and "FAIL" not in pairs.table(good)
+    assert pairs.are_floors_met(good)
+    assert "FAIL" not in rendered("pairs-table", **pairs.over_pairs(good))
     for bad in ([*good, answer(0.1, None)], [*good[1:], answer(0.05, 1)]):
         assert not pairs.are_floors_met(bad)
 

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.judging import other_tools, trial
+from benchmarks.blocks import rendered
+from benchmarks.judging import other_tools, page, trial
 from benchmarks.judging.floors import Floor, floors, names_factor, real_sets
-from benchmarks.judging.runs import Runs, outcomes_of
-from benchmarks.judging.tables import floor_table, kind_table, misses, scenario_table
-from benchmarks.judging.trial import Outcome, PairOutcome, ScanOutcome, judge, try_out
+from benchmarks.judging.outcomes import Outcome, PairOutcome, ScanOutcome
+from benchmarks.judging.page import Results, page_text
+from benchmarks.judging.trial import Runs, judge, try_out
 from benchmarks.kept import Record, Study, measured
 from benchmarks.results import DOCS
 from benchmarks.scores import Stated, bound
 from benchmarks.seeds import FIRST_FRESH
-from benchmarks.trust_page import Results, page_text
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Scene, make_scene
 from scanweld.errors import InputError
@@ -27,13 +27,17 @@ from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import Reconstruction, ScanReport, ScanVerdict
 from tests.results import a_pair, a_result
 
-CLEAN = "ring of 6"
+CLEAN, FALSE = "ring of 6", "called good that are wrong"
 TURN = Pose.exp([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
 
 
 @cache
 def scene_of(name: str) -> Scene:
     return make_scene(SCENARIOS[name], 1)
+
+
+def is_met(outcome: Outcome, measure: str) -> bool | None:
+    return floor_of([outcome], measure).is_met
 
 
 def told_as_true(scene: Scene, world: int = 0) -> Reconstruction:
@@ -49,18 +53,17 @@ def told_as_true(scene: Scene, world: int = 0) -> Reconstruction:
     return replace(found, poses={n: gauge @ scene.truth[n] for n in names}, pairs=pairs)
 
 
-def moved(found: Reconstruction, name: str, by: Pose) -> Reconstruction:
-    """The same with one scan elsewhere, and still called good."""
-    return replace(found, poses={**found.poses, name: found.poses[name] @ by})
+def one_moved() -> Reconstruction:
+    """A clean run with one scan elsewhere, and still called good."""
+    found = told_as_true(scene_of(CLEAN))
+    return replace(found, poses={**found.poses, "scan_03": found.poses["scan_03"] @ TURN})
 
 
 def with_confidence(outcome: Outcome, confidence: float) -> Outcome:
     """The same outcome, all that is placed stated with one confidence."""
-    return replace(
-        outcome,
-        scans=tuple(replace(s, confidence=confidence) for s in outcome.scans),
-        pairs=tuple(p and replace(p, confidence=confidence) for p in outcome.pairs),
-    )
+    scans = tuple(s._replace(confidence=confidence) for s in outcome.scans)
+    pairs = tuple(p and p._replace(confidence=confidence) for p in outcome.pairs)
+    return replace(outcome, scans=scans, pairs=pairs)
 
 
 def outcome_of(scenario: str, found: Reconstruction | None = None) -> Outcome:
@@ -75,44 +78,43 @@ def floor_of(outcomes: list[Outcome], measure: str) -> Floor:
     return found
 
 
+def told(template: str, *outcomes: Outcome) -> str:
+    make = {"trust-misses": page.misses, "trust-scenarios": page.by_scenario}
+    return rendered(template, **make.get(template, page.by_kind)(outcomes))
+
+
 def test_a_run_that_tells_the_truth_is_right():
     outcome = outcome_of(CLEAN)
     assert all(scan.is_right and scan.is_good and not scan.is_false for scan in outcome.scans)
     assert all(pair and pair.is_right for pair in outcome.pairs)
-    assert floor_of([outcome], "clean").is_met
-    assert floor_of([outcome], "called good that are wrong").is_met
-    assert misses([outcome]) == "None.\n"
+    assert is_met(outcome, "clean") and is_met(outcome, FALSE)
+    assert told("trust-misses", outcome) == "None.\n"
+    assert floor_of([outcome], "AUC").asked == ">= 0.99"
+    names = [floor.measure for floor in floors([])]
+    assert len(names) == len(set(names)) == 10
 
 
-def test_a_wrong_scan_that_is_called_good_is_falsely_good():
-    outcome = outcome_of(CLEAN, moved(told_as_true(scene_of(CLEAN)), "scan_03", TURN))
+def test_a_wrong_scan_is_falsely_good_only_if_it_is_called_good():
+    found = one_moved()
+    outcome = outcome_of(CLEAN, found)
     assert [scan.is_false for scan in outcome.scans].count(True) == 1
-    assert floor_of([outcome], "called good that are wrong").is_met is False
-    assert "**falsely good**" in misses([outcome])
-    assert "| **1** |" in scenario_table([outcome])
-
-
-def test_a_wrong_scan_that_is_called_doubtful_is_not_falsely_good():
-    found = moved(told_as_true(scene_of(CLEAN)), "scan_03", TURN)
+    assert is_met(outcome, FALSE) is False and "| **1** |" in told("trust-scenarios", outcome)
+    assert "**falsely good**" in told("trust-misses", outcome)
     doubtful = ScanReport(verdict=ScanVerdict.DOUBTFUL, reason="hardly fits")
     outcome = outcome_of(CLEAN, replace(found, scans={**found.scans, "scan_03": doubtful}))
-    assert floor_of([outcome], "called good that are wrong").is_met
-    assert floor_of([outcome], "clean").is_met is False
-    assert "1 of 6 not right" in misses([outcome])
+    assert is_met(outcome, FALSE) and is_met(outcome, "clean") is False
+    assert "1 of 6 not right" in told("trust-misses", outcome)
 
 
 def test_any_pose_of_a_symmetric_object_is_falsely_good_and_asserted_from_a_half_on():
     outcome = outcome_of("box")
-    assert all(scan.is_false for scan in outcome.scans)
+    assert all(scan.is_false for scan in outcome.scans) and is_met(outcome, FALSE) is False
     assert not any(pair and pair.is_right for pair in outcome.pairs)
-    assert floor_of([outcome], "called good that are wrong").is_met is False
-    for confidence, is_met in ((0.6, False), (0.4, True)):
-        assert floor_of([with_confidence(outcome, confidence)], "pose asserted").is_met is is_met
+    assert is_met(with_confidence(outcome, 0.6), "pose asserted") is False
+    assert is_met(with_confidence(outcome, 0.4), "pose asserted")
     clean = floor_of([with_confidence(outcome_of(CLEAN), 0.99)], "pose asserted")
     assert "0 of 0 scans" in clean.reached and clean.is_met is None
-
-
-def test_scans_without_the_mark_are_open_and_the_others_are_not():
+    # Only the scans that show the mark are determined.
     scene = scene_of("vase with a knob")
     assert 0 < len(scene.is_open) < len(scene.scans)
     assert sum(s.is_false for s in outcome_of("vase with a knob").scans) == len(scene.is_open)
@@ -131,12 +133,11 @@ def test_strangers_are_wrong_wherever_they_are_placed():
         pairs=(*found.pairs, a_pair(min(first, name), max(first, name))),
     )
     before, after = (outcome_of("mirrored scan", each) for each in (found, placed))
-    assert floor_of([before], "of another object").is_met
-    assert floor_of([after], "of another object").is_met is False
+    assert is_met(before, "of another object") and is_met(after, "of another object") is False
     assert [p.is_right for p in after.pairs if p].count(False) == 1
 
 
-def test_two_objects_in_one_component_are_wrong_and_in_two_are_right():
+def test_objects_are_right_in_one_component_each():
     scene = scene_of("two objects")
     one, other = told_as_true(scene, 0), told_as_true(scene, 1)
     scans = {name: found.scans[name] for found in (one, other) for name in found.poses}
@@ -145,9 +146,7 @@ def test_two_objects_in_one_component_are_wrong_and_in_two_are_right():
     assert all(s.is_right for s in outcome_of("two objects", apart).scans)
     mixed = replace(both, components=(one.components[0] + other.components[0],))
     assert sum(s.is_false for s in outcome_of("two objects", mixed).scans) >= 6
-
-
-def test_what_lies_apart_is_not_right():
+    # Nor is what lies apart from its own object right.
     found = told_as_true(scene_of(CLEAN))
     names = found.components[0]
     outcome = outcome_of(CLEAN, replace(found, components=(names[:4], names[4:])))
@@ -167,30 +166,22 @@ def test_a_pair_is_right_within_five_degrees():
         assert pair is not None and pair.is_right is is_right
 
 
-@pytest.mark.parametrize(
-    ("reason", "is_named"),
-    [
-        ("its scale differs: 1.010 times too large", True),
-        ("too large by 1.0 %, its scale is wrong", True),
-        ("scale 0.990", True),
-        ("scale 1.05", False),
-        ("residual 1.010", False),
-    ],
-)
-def test_a_factor_is_named_or_not(reason: str, is_named: bool):
-    scan = ScanOutcome(source="0", world=0, is_open=False, factor=1.01, reason=reason)
-    assert names_factor(scan) is is_named
+def test_a_factor_is_named_or_not():
+    right = ("its scale differs: 1.010 times too large", "too large by 1.0 %, its scale is wrong")
+    reasons = {**dict.fromkeys((*right, "scale 0.990"), True), "scale 1.05": False}
+    for reason, is_named in {**reasons, "residual 1.010": False}.items():
+        scan = ScanOutcome(source="0", world=0, is_open=False, factor=1.01, reason=reason)
+        assert names_factor(scan) is is_named, reason
 
 
 def test_outcomes_come_back_from_their_records():
-    found = moved(told_as_true(scene_of(CLEAN)), "scan_03", TURN)
-    outcome = with_confidence(outcome_of(CLEAN, found), 0.25)
+    outcome = with_confidence(outcome_of(CLEAN, one_moved()), 0.25)
     again = Outcome.of({"scenario": CLEAN, "seed": 1}, outcome.record())
     assert again.record() == outcome.record() and again.pairs == outcome.pairs
     for kind in PairKind:
         pair = PairOutcome(0.125, kind, False, False, True)
         assert PairOutcome.of(pair.brief()) == pair
-    scan = ScanOutcome.of(["3", 0, False, 1.0, "good", "wrong", False, 0.5, 9.0, 2.0, "why"])
+    scan = ScanOutcome(*["3", 0, False, 1.0, "good", "wrong", False, 0.5, 9.0, 2.0, "why"])
     assert scan.is_good and scan.is_false and scan.rotation_deg == 9.0
 
 
@@ -209,18 +200,20 @@ def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.Mo
         confident = with_confidence(true, 0.9 - 0.01 * (seed - FIRST_FRESH))
         return replace(confident, scenario=scenario, seed=seed)
 
-    monkeypatch.setattr("benchmarks.judging.runs.try_out", stub)
+    monkeypatch.setattr(trial, "try_out", stub)
     study = Study(out=tmp_path, work=tmp_path / "w", workers=1, quick=False, command="test")
     runs = Runs(scenarios=(CLEAN,), seeds=5)
     with pytest.raises(Interrupted):
         measured(runs, study)
     made[:] = made[:1]
-    tables = []
-    for _ in range(2):
-        outcomes = outcomes_of(measured(runs, study))
-        assert made[1:] == [FIRST_FRESH + 3, FIRST_FRESH + 4]
-        tables.append(scenario_table(outcomes) + floor_table(floors(outcomes)))
-    assert tables[0] == tables[1] and f"| {CLEAN} | clean | 5 |" in tables[0]
+    first, again = ([Outcome.of(r.unit, r.result) for r in measured(runs, study)] for _ in "ab")
+    assert made[1:] == [FIRST_FRESH + 3, FIRST_FRESH + 4] and len(first) == 5
+    assert [o.record() for o in first] == [o.record() for o in again]
+    assert f"| {CLEAN} | clean | 5 |" in told("trust-scenarios", *first)
+    units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
+    seeds = (FIRST_FRESH, FIRST_FRESH + 1)
+    assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]
+    assert len(Runs().units(False)) == sum(scenario.seeds for scenario in SCENARIOS.values()) >= 300
 
 
 @pytest.mark.parametrize(
@@ -236,36 +229,31 @@ def test_failed_runs_are_kept_as_such(
     monkeypatch.setattr(trial, "make_scene", lambda *_: scene_of(CLEAN))
     outcome = try_out(CLEAN, 1)
     assert outcome.verdict == verdict and len(outcome.pairs) == 15
-    assert floor_of([outcome], "crash").is_met is (verdict != "crash")
-    assert floor_of([outcome], "clean").is_met is False
-    assert f"**{verdict}**" in misses([outcome])
+    assert is_met(outcome, "crash") is (verdict != "crash") and is_met(outcome, "clean") is False
+    assert f"**{verdict}**" in told("trust-misses", outcome)
 
 
 def test_the_worst_condition_is_told():
     true = outcome_of(CLEAN)
-    lost = tuple(replace(s, standing="unplaced", verdict="unplaced") for s in true.scans[:2])
+    lost = tuple(s._replace(standing="unplaced", verdict="unplaced") for s in true.scans[:2])
     bad = replace(true, scenario="hand", scans=lost + true.scans[2:])
     floor = floor_of([replace(true, scenario="table"), bad], "hard condition")
-    assert floor.is_met is False
-    assert floor.reached == "least: hand, 67 %; 1 of 2 below"
+    assert floor.is_met is False and floor.reached == "least: hand, 67 %; 1 of 2 below"
 
 
-def test_kinds_of_pairs_are_counted():
-    table = kind_table([outcome_of(name) for name in (CLEAN, "box")])
+def test_kinds_of_pairs_are_counted_and_a_zero_is_told_with_its_bound():
+    """Rates at which 0 of n runs has a chance of 5 % lie just below 3 / n."""
+    table = told("trust-kinds", outcome_of(CLEAN), outcome_of("box"))
     assert "| good | 25 | 15 | 25 | 10 | 10 |" in table
     assert "| no overlap | 0 | 0 | 0 | 0 | 0 |" in table
-
-
-def test_a_zero_is_told_with_its_bound():
-    """Rates at which 0 of n runs has a chance of 5 % lie just below 3 / n."""
     for count in (8, 40, 300):
         rate = 3 / count
         assert bound(count) == f"< {100 * rate:.2g} % of runs"
         assert 0.01 < (1 - rate) ** count < 0.05
     assert bound(3) == "too few runs for a bound"
     outcomes = [replace(outcome_of(CLEAN), seed=seed) for seed in range(30)]
-    assert "(< 10 % of runs)" in floor_of(outcomes, "called good that are wrong").reached
-    assert "| 450 | 0 (< 10 % of runs) |" in kind_table(outcomes)
+    assert "(< 10 % of runs)" in floor_of(outcomes, FALSE).reached
+    assert "| 450 | 0 (< 10 % of runs) |" in told("trust-kinds", *outcomes)
     crashed = [*outcomes, replace(outcomes[0], verdict="crash")]
     assert floor_of(crashed, "crash").reached == "1 of 31"
 
@@ -282,20 +270,15 @@ def stated(scores: list[float], is_right: list[bool]) -> Stated:
     return Stated.of(zip(scores, is_right, strict=True))
 
 
-def test_calibration_error_of_known_answers():
+def test_scores_of_known_answers():
     assert stated([0.7] * 10, [True] * 7 + [False] * 3).calibration_error(1) == pytest.approx(0.0)
     wrong_way = stated([1.0] * 5 + [0.0] * 5, [False] * 5 + [True] * 5)
-    assert wrong_way.calibration_error(2) == 1.0
+    assert wrong_way.calibration_error(2) == 1.0 and wrong_way.auc == 0.0
     assert np.isnan(stated([], []).calibration_error()) and np.isnan(stated([], []).auc)
-    bins = stated([0.1, 0.2, 0.8, 0.9], [False, True, True, True]).bins(2)
-    assert [(b.confidence, b.right, b.count) for b in bins] == [
-        (pytest.approx(0.15), 0.5, 2),
-        (pytest.approx(0.85), 1.0, 2),
-    ]
+    low, high = stated([0.1, 0.2, 0.8, 0.9], [False, True, True, True]).bins(2)
+    assert (low.confidence, low.right, low.count) == (pytest.approx(0.15), 0.5, 2)
+    assert (high.confidence, high.right, high.count) == (pytest.approx(0.85), 1.0, 2)
     assert stated([1.0, 0.5], [True, False]).brier == pytest.approx(0.125)
-
-
-def test_risk_falls_with_the_coverage_of_a_good_confidence():
     coverage, risk = stated([0.9, 0.8, 0.8, 0.1], [True, True, False, False]).risk_coverage()
     np.testing.assert_allclose(coverage, [0.25, 0.75, 1.0])
     np.testing.assert_allclose(risk, [0.0, 1 / 3, 0.5])
@@ -308,30 +291,14 @@ def test_other_tools_are_judged_by_their_own_scores():
     unit = {"scenario": CLEAN, "seed": 1}
     record = Record(unit=unit, result={"fpfh": answers, "kiss": [None] * 15})
     other = Record(unit={"scenario": "hand", "seed": 1}, result=record.result)
-    told = other_tools.answers_by_tool([record, other], [true])
-    assert [len(told[name]) for name in ("own", "fpfh", "kiss")] == [15, 14, 0]
-    assert told["fpfh"].sure == pytest.approx(0.5)
-    assert "| 14 | 2 | 0.958 | 50 |" in other_tools.other_tools_table([record], [true])
+    tools = other_tools.answers_by_tool([record, other], [true])
+    assert [len(tools[name]) for name in ("own", "fpfh", "kiss")] == [15, 14, 0]
+    assert tools["fpfh"].sure == pytest.approx(0.5)
+    table = rendered("trust-rivals", tools=tools, titles=other_tools.TITLES)
+    assert "| 14 | 2 | 0.958 | 50 |" in table
 
 
-def test_the_page_is_that_of_the_results():
+def test_the_page_is_that_of_the_results_and_says_what_was_not_measured(tmp_path: Path):
     text = (DOCS / "trust.md").read_text(encoding="utf-8")
     assert page_text(text, Results(DOCS)) == text, "run python -m benchmarks.trust --pages"
-
-
-def test_the_page_says_what_was_not_measured(tmp_path: Path):
-    text = page_text((DOCS / "trust.md").read_text(encoding="utf-8"), Results(tmp_path))
-    assert text.count("Not measured yet.") == 8
-
-
-def test_every_floor_has_a_measure_of_its_own():
-    names = [floor.measure for floor in floors([])]
-    assert len(names) == len(set(names)) == 10
-    assert floor_of([outcome_of(CLEAN)], "AUC").asked == ">= 0.99"
-
-
-def test_units_are_those_asked_for():
-    units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
-    seeds = (FIRST_FRESH, FIRST_FRESH + 1)
-    assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]
-    assert len(Runs().units(False)) == sum(scenario.seeds for scenario in SCENARIOS.values())
+    assert page_text(text, Results(tmp_path)).count("Not measured yet.") == 8
