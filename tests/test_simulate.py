@@ -50,33 +50,28 @@ def test_the_truth_puts_the_scans_on_the_mesh(tmp_path: Path, model: CameraModel
         np.testing.assert_array_equal(written.poses[name].matrix(), pose.matrix())
 
 
-def test_same_seed_same_files(tmp_path: Path):
-    for name, seed in (("a", 4), ("b", 4), ("c", 5)):
-        simulate(small_creature(), tmp_path / name, num_scans=3, pixels=60, seed=seed)
+def test_same_seed_same_files_whose_names_say_nothing_about_the_views(tmp_path: Path):
+    """Numbered in the order of the views, azimuths would rise."""
+    for name, seed in (("a", 1), ("b", 1), ("c", 5)):
+        truth = simulate(small_creature(), tmp_path / name, num_scans=7, pixels=40, seed=seed)
     first, again, other = (files_of(tmp_path / name) for name in "abc")
     assert first == again
     assert not set(first.values()) & set(other.values())
-
-
-def test_names_say_nothing_about_the_views(tmp_path: Path):
-    """Numbered in the order of the views, azimuths would rise."""
-    truth = simulate(small_creature(), tmp_path, num_scans=7, pixels=60, seed=1)
     azimuths = []
     for name in sorted(truth.poses):
-        scan = read_scan(tmp_path / f"{name}.ply")
-        assert scan.scan_from_sensor is not None
-        x, y, _ = (truth.poses[name] @ scan.scan_from_sensor).translation
+        x, y, _ = (
+            truth.poses[name] @ read_scan(tmp_path / f"c/{name}.ply").sensor_pose
+        ).translation
         azimuths.append(np.degrees(np.arctan2(y, x)) % 360)
     assert (np.diff(azimuths) < 0).sum() > 1
 
 
-@pytest.mark.parametrize("num_scans", [8, 10, 12])
+@pytest.mark.parametrize("num_scans", [8, 12])
 def test_neighbouring_views_overlap(num_scans: int):
     """Every view has another that it shares a third with, and these join all of them."""
-    mesh = small_creature()
-    views = views_around(mesh, num_scans, np.random.default_rng(0), pixels=80)
-    joined = np.linalg.matrix_power((overlaps(mesh, views) > 0.3).astype(int), num_scans) > 0
-    assert joined.all()
+    views = views_around(small_creature(), num_scans, np.random.default_rng(0), pixels=80)
+    near = (overlaps(small_creature(), views) > 0.3).astype(int)
+    assert (np.linalg.matrix_power(near, num_scans) > 0).all()
 
 
 def test_a_filled_folder_is_left_alone_and_nothing_to_scan_is_an_error(tmp_path: Path):
