@@ -20,7 +20,7 @@ SCALED = (np.eye(4) * [2, 2, 2, 1]).tolist()
 MIRRORED = (np.eye(4) * [1, 1, -1, 1]).tolist()
 
 
-def assert_same(a: PoseSet, b: PoseSet) -> None:
+def assert_same(a: PoseSet, b: PoseSet):
     assert a.components == b.components
     assert a.unplaced == b.unplaced
     assert set(a.poses) == set(b.poses)
@@ -35,7 +35,7 @@ def assert_same(a: PoseSet, b: PoseSet) -> None:
 )
 def test_written_poses_are_read_back_exactly(
     names: list[str], cuts: tuple[int, int], seed: int, tmp_path: Path
-) -> None:
+):
     first, second = sorted(cuts)
     parts = (tuple(names[:first]), tuple(names[first:second]))
     rng = np.random.default_rng(seed)
@@ -53,7 +53,7 @@ def test_written_poses_are_read_back_exactly(
     assert path.read_bytes() == written
 
 
-def test_what_is_written_has_the_promised_form_whatever_the_order(tmp_path: Path) -> None:
+def test_what_is_written_has_the_promised_form_whatever_the_order(tmp_path: Path):
     rng = np.random.default_rng(5)
     names = ("scan10", "scan2", "büste")
     poses = PoseSet(
@@ -80,7 +80,7 @@ def test_what_is_written_has_the_promised_form_whatever_the_order(tmp_path: Path
     assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
 
 
-def test_without_components_all_scans_are_one(tmp_path: Path) -> None:
+def test_without_components_all_scans_are_one(tmp_path: Path):
     path = tmp_path / "flat.json"
     path.write_text("\ufeff" + json.dumps({"b": IDENTITY, "a": IDENTITY}), encoding="utf-8")
     poses = read_poses(path)
@@ -116,7 +116,7 @@ def test_without_components_all_scans_are_one(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str) -> None:
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str):
     path = tmp_path / "poses.json"
     with pytest.raises(ReadError, match=re.escape(str(path))):
         read_poses(path)
@@ -130,7 +130,7 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str)
 @pytest.mark.parametrize(
     "components", [(), (("a",),), (("a", "b"), ("b",)), (("a", "a", "b"),), (("a", "b", "c"),)]
 )
-def test_components_name_every_placed_scan_once(components: tuple[tuple[str, ...], ...]) -> None:
+def test_components_name_every_placed_scan_once(components: tuple[tuple[str, ...], ...]):
     poses = {"a": Pose.identity(), "b": Pose.identity()}
     with pytest.raises(ValueError, match="every placed scan"):
         PoseSet(poses=poses, components=components)
@@ -138,7 +138,7 @@ def test_components_name_every_placed_scan_once(components: tuple[tuple[str, ...
 
 @pytest.mark.parametrize("folder", ["stanford-bunny", "stanford-dragon"])
 @pytest.mark.parametrize("name", ["poses.json", "poses_conf.json"])
-def test_reference_poses_keep_their_digits(folder: str, name: str) -> None:
+def test_reference_poses_keep_their_digits(folder: str, name: str):
     path = require_data(f"{folder}/{name}")
     content = json.loads(path.read_text(encoding="utf-8"))
     poses = read_poses(path).poses
