@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from scanweld.config import PairsConfig
 from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.rivals import as_rival
-from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import Alternative, PairKind, margin_among, refutation_among
 from scanweld.pairs.verdict import Measured, classify_pair
 from tests.results import turned
@@ -19,13 +18,17 @@ def evidence(agree: float, front: float = 0.0, free: float = 0.0) -> Evidence:
     return Evidence(agree=agree, front=front, contradict=0.0, free=free, occluded=left, unknown=0.0)
 
 
+def options_of(evidences: list[Evidence]) -> list[Alternative]:
+    return [Alternative(i_from_j=turned(k), evidence=e) for k, e in enumerate(evidences)]
+
+
 def margin(best: Evidence, rivals: list[Evidence]) -> float:
-    options = [Alternative(i_from_j=turned(k), evidence=e) for k, e in enumerate([best, *rivals])]
+    options = options_of([best, *rivals])
     return margin_among(options[0], options)
 
 
 def refuted(best: Evidence, rivals: list[Evidence]) -> float:
-    options = [Alternative(i_from_j=turned(k), evidence=e) for k, e in enumerate([best, *rivals])]
+    options = options_of([best, *rivals])
     return refutation_among(options[0], options)
 
 
@@ -33,11 +36,12 @@ def test_a_rival_that_nothing_contradicts_is_as_good_though_it_overlaps_less():
     """The next turn of a toothed wheel: fewer teeth meet, and all that meet fit."""
     assert margin(evidence(0.9, front=0.005), [evidence(0.5, front=0.003)]) < 0.05
     assert margin(evidence(0.9), [evidence(0.35)]) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_rival_that_is_contradicted_counts_by_its_score():
+    assert margin(evidence(0.8, free=0.2), [evidence(0.4, free=0.11)]) < 0.1, "as dirty"
     best, rival = evidence(0.6, front=0.01), evidence(0.5, front=0.1, free=0.1)
     assert margin(best, [rival]) == pytest.approx((best.score - rival.score) / best.score)
+    options = options_of([evidence(0.9, front=0.01), evidence(0.4, front=0.005)])
+    found = classify_pair((0, 1), options, Measured(information=np.eye(6), rms=0.1), PairsConfig())
+    assert found.kind is PairKind.AMBIGUOUS and len(found.alternatives) == 2
 
 
 def test_slivers_are_no_rivals():
@@ -45,21 +49,10 @@ def test_slivers_are_no_rivals():
     assert margin(best, [evidence(0.04)]) > 0.9
     assert margin(best, [evidence(0.18)]) > 0.6, "a narrow view fits a third as well elsewhere"
     assert margin(evidence(0.15), [evidence(0.06)]) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_rival_as_dirty_as_the_best_pose_counts_in_full():
-    best, rival = evidence(0.8, free=0.2), evidence(0.4, free=0.11)
-    assert margin(best, [rival]) < 0.1
-
-
-def test_a_place_where_nothing_agrees_is_a_rival_by_its_score_alone():
-    assert as_rival(-0.1, (0.0, 0.0), (0.0, 0.0)) == -0.1
-    assert as_rival(0.2, (0.0, 0.5), (0.0, 0.0)) == 0.2
-
-
-def test_without_rivals_the_margin_is_full_and_without_a_score_none():
     assert margin(evidence(0.3), []) == 1.0
     assert margin(evidence(0.1, front=0.2), []) == 0.0
+    assert as_rival(-0.1, (0.0, 0.0), (0.0, 0.0)) == -0.1, "where nothing agrees, its score alone"
+    assert as_rival(0.2, (0.0, 0.5), (0.0, 0.0)) == 0.2
 
 
 @given(st.floats(0.06, 1.0), st.floats(0.01, 1.0), st.floats(0, 0.3), st.floats(0, 0.3))
@@ -76,13 +69,3 @@ def test_how_clearly_rivals_are_refuted_is_told_by_the_least_contradicted_one():
     assert refuted(best, [poorer, evidence(0.3)]) == 0.0
     assert refuted(best, [evidence(0.08)]) == 1.0, "a sliver is no rival"
     assert refuted(best, []) == 1.0
-
-
-def test_the_pair_of_a_toothed_wheel_is_ambiguous():
-    options = (
-        Alternative(i_from_j=Pose.identity(), evidence=evidence(0.9, front=0.01)),
-        Alternative(i_from_j=turned(1), evidence=evidence(0.4, front=0.005)),
-    )
-    measured = Measured(information=np.eye(6), rms=0.1)
-    found = classify_pair((0, 1), options, measured, PairsConfig())
-    assert found.kind is PairKind.AMBIGUOUS and len(found.alternatives) == 2

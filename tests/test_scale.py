@@ -38,7 +38,7 @@ def estimates(factor: float, unit: float = 1.0) -> dict[int, ScaleEstimate]:
     return estimate_scales(scans, poses)
 
 
-@pytest.mark.parametrize("factor", [1.015, 0.985, 1.02])
+@pytest.mark.parametrize("factor", [1.015, 0.985])
 def test_the_scan_that_is_off_is_named_with_its_factor(factor: float):
     found = estimates(factor)
     assert [k for k, estimate in found.items() if estimate.is_off] == [2]
@@ -50,6 +50,9 @@ def test_scans_in_one_unit_are_not_blamed():
     assert not any(estimate.is_off for estimate in found.values())
     assert max(abs(estimate.factor - 1) for estimate in found.values()) < 0.002
     assert all(0 < estimate.deviation < 0.005 for estimate in found.values())
+    scans, poses = placed(1.0)
+    apart = {k: Pose.exp([0, 0, 0, 1e4 * k, 0, 0]) @ pose for k, pose in poses.items()}
+    assert estimate_scales(scans, apart) == {}, "scans that touch nothing have no scale"
 
 
 def test_the_unit_of_all_does_not_matter():
@@ -58,23 +61,10 @@ def test_the_unit_of_all_does_not_matter():
         assert m[k].factor == pytest.approx(estimate.factor, abs=1e-4)
 
 
-def test_words_give_the_factor_that_a_user_can_apply():
-    large = ScaleEstimate(factor=1.0101, deviation=0.0011)
-    small = ScaleEstimate(factor=0.99, deviation=0.001)
-    assert "1.010 times too large" in large.words() and "0.001" in large.words()
-    assert "1.010 times too small" in small.words()
-
-
-def test_scans_that_touch_nothing_have_no_scale():
-    scans, poses = placed(1.0)
-    apart = {
-        k: Pose(rotation=pose.rotation, translation=pose.translation + 1e4 * k)
-        for k, pose in poses.items()
-    }
-    assert estimate_scales(scans, apart) == {}
-
-
-def test_an_uncertain_scale_is_no_accusation():
+def test_an_uncertain_scale_is_no_accusation_and_words_give_the_factor_to_apply():
     assert not ScaleEstimate(factor=1.02, deviation=0.01).is_off
     assert not ScaleEstimate(factor=1.003, deviation=1e-5).is_off
     assert ScaleEstimate(factor=np.exp(-0.01), deviation=0.002).is_off
+    words = ScaleEstimate(factor=1.0101, deviation=0.0011).words()
+    assert "1.010 times too large" in words and "0.001" in words
+    assert "1.010 times too small" in ScaleEstimate(factor=0.99, deviation=0.001).words()
