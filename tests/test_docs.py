@@ -9,6 +9,7 @@ from urllib.parse import unquote
 
 import pytest
 
+import scanweld
 from benchmarks.blocks import BLOCK
 from benchmarks.paper import ablations, method_reasons
 from benchmarks.paper.method_numbers import NUMBERS
@@ -63,15 +64,6 @@ def test_every_measured_part_stands_somewhere(pages: ModuleType):
     assert {name for _, name, _ in BLOCK.findall(text)} == set(pages.BLOCKS)
 
 
-def test_method_is_what_its_template_and_the_results_make():
-    try:
-        text = method_text(Results(DOCS / "paper"))
-    except InputError as error:
-        pytest.skip(f"no results yet: {error}")
-    committed = (DOCS / "method.md").read_text(encoding="utf-8")
-    assert committed == text, "run python -m benchmarks.paper --pages"
-
-
 def test_method_template_names_numbers_and_constants_that_are_there():
     places = PLACE.findall(TEMPLATE.read_text(encoding="utf-8"))
     assert {name for equals, name in places if not equals} == set(NUMBERS)
@@ -89,15 +81,18 @@ def test_reasons_ask_for_variants_that_the_ablations_measure():
     assert set(method_reasons._TERMS.values()) <= terms
 
 
-@pytest.mark.parametrize("path", ["heat.keypoints._NO_SUCH", "Config.heat.no_such", "no.such.X"])
-def test_unknown_constants_are_refused(path: str):
-    with pytest.raises(ValueError, match="no such constant"):
-        constant(path)
-
-
-def test_a_missing_result_is_told_in_one_line(tmp_path: Path):
+def test_method_is_what_its_template_and_the_results_make(tmp_path: Path):
+    for path in ("heat.keypoints._NO_SUCH", "Config.heat.no_such", "no.such.X"):
+        with pytest.raises(ValueError, match="no such constant"):
+            constant(path)
     with pytest.raises(InputError, match=r"^\S+: is missing; measure it first \(.*\)$"):
         method_text(Results(tmp_path, tmp_path))
+    try:
+        text = method_text(Results(DOCS / "paper"))
+    except InputError as error:
+        pytest.skip(f"no results yet: {error}")
+    committed = (DOCS / "method.md").read_text(encoding="utf-8")
+    assert committed == text, "run python -m benchmarks.paper --pages"
 
 
 # The page of the figures draws them, which takes too long here and needs the meshes.
@@ -143,21 +138,27 @@ def _headings(page: Path) -> set[str]:
 
 def test_report_page_gives_the_limits_of_the_code():
     text = " ".join((DOCS / "report.md").read_text(encoding="utf-8").split())
-    config = Config()
     assert pytest.approx(1 / 3) == FREE_WEIGHT
+    angle, shift = rivals.RIVAL_ANGLE_DEG, 100 * rivals.RIVAL_SHIFT_DIAMETERS
     for told in (
         f"n·m > {AGREE_COSINE:g}",
         f"n·m < {CONTRADICT_COSINE:g}",
         f"agree - {VIOLATION_WEIGHT:g} * front - {CONTRADICT_WEIGHT:g} * contradict - free / 3",
         f"agree < {MIN_AGREE:g}",
-        f"more than {rivals.RIVAL_ANGLE_DEG:g} degrees or "
-        f"{100 * rivals.RIVAL_SHIFT_DIAMETERS:g} % of the diameter away",
-        f"The limits of a distinct pose are {rivals.RIVAL_ANGLE_DEG:g} degrees and "
-        f"{100 * rivals.RIVAL_SHIFT_DIAMETERS:g} % of the diameter",
+        f"more than {angle:g} degrees or {shift:g} % of the diameter away",
+        f"The limits of a distinct pose are {angle:g} degrees and {shift:g} % of the diameter",
         f"turn by more than {turntable.MIN_TURN_DEG:g} degrees",
         f"agree on less than {MIN_AGREE:g}",
         f"more than {MAX_SCORE_LOSS:g} of their mean score",
         f"less than {'twice' if OUTWEIGHED == 2 else OUTWEIGHED} that pair's",
-        f"up to `prepare.num_samples` ({config.prepare.num_samples})",
+        f"up to `prepare.num_samples` ({Config().prepare.num_samples})",
     ):
         assert told in text, told
+
+
+def test_the_api_page_shows_every_public_name_once():
+    shown = re.findall(r"^::: scanweld\.(\w+)$", (DOCS / "api.md").read_text("utf-8"), re.MULTILINE)
+    assert sorted(shown) == sorted(scanweld.__all__)
+    for name in scanweld.__all__:
+        assert name == "Event" or getattr(scanweld, name).__doc__, name
+    assert re.fullmatch(r"\d+\.\d+\.\d+.*", scanweld.__version__)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from scanweld.config import Config, FusionConfig, HeatConfig, PairsConfig, PrepareConfig
+from scanweld.config import Config, FusionConfig, HeatConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.metrics import (
     Standing,
@@ -205,12 +205,12 @@ def test_of_objects_that_slide_nothing_is_asserted(name: str):
 def test_a_scan_of_another_scale_is_doubtful_and_part_of_the_model_only_if_asked_for():
     """Of six scans the third one is too large; what only it saw is what the model grows by."""
     noise = NoiseModel(depth_diameters=5e-4)
-    scans = list(creature_scene(6, pixels=140, noise=noise, seed=3).scans)
+    scans = list(creature_scene(6, noise=noise, seed=3).scans)
     scans[2] = scaled(scans[2], 1.015)
     memory, results = Memory(), []
     for asked in (False, True):
         fusion = FusionConfig(max_voxels_across=80, with_doubtful=asked)
-        config = Config(pairs=PairsConfig(keypoints="even"), fusion=fusion)
+        config = CONFIG.model_copy(update={"fusion": fusion})
         results.append(pipeline.run(scans, config, workers=1, cache=memory))
     without, with_it = results
     accused = {name for name, scan in without.scans.items() if "times too" in scan.reason}
