@@ -1,7 +1,6 @@
 """The project's own objects are closed, in one piece, and the same each time."""
 
 import numpy as np
-import pytest
 import trimesh
 from scipy.spatial import KDTree
 
@@ -14,25 +13,15 @@ def as_trimesh(mesh: TriangleMesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_creature_is_one_closed_body(seed: int):
-    mesh = as_trimesh(small_creature(seed))
-    assert mesh.is_watertight
-    assert mesh.body_count == 1
-    assert mesh.volume > 0
-    assert 5_000 < len(mesh.faces) < 20_000
-
-
-def test_the_full_creature_has_enough_faces_and_plain_objects_are_closed():
-    mesh = creature()
-    assert 50_000 < len(mesh.faces) < 100_000
-    assert as_trimesh(mesh).is_watertight
-    assert mesh.colors is not None
-    assert mesh.colors.std(axis=0).min() > 10
-    for make in PRIMITIVES.values():
-        mesh = as_trimesh(make())
-        assert mesh.is_watertight
-        assert mesh.volume > 0
+def test_objects_are_closed_and_in_one_piece():
+    full = creature()
+    assert 50_000 < len(full.faces) < 100_000
+    assert full.colors is not None and full.colors.std(axis=0).min() > 10
+    small = [small_creature(seed) for seed in range(3)]
+    assert all(5_000 < len(mesh.faces) < 20_000 for mesh in small)
+    plain = [make() for make in PRIMITIVES.values()]
+    for mesh in map(as_trimesh, [full, *small, *plain]):
+        assert mesh.is_watertight and mesh.body_count == 1 and mesh.volume > 0
 
 
 def test_a_creature_is_the_same_each_time_and_another_for_each_seed():

@@ -132,13 +132,11 @@ def test_ascii_stl(tmp_path: Path):
         "0 0 1\n1 0 2\nnan 1.#QNAN 0\n0 1 3\n",
     ],
 )
-@pytest.mark.parametrize("suffix", ["xyz", "txt", "csv"])
-def test_text_of_points(text: str, suffix: str, tmp_path: Path):
-    path = tmp_path / f"a.{suffix}"
-    path.write_bytes(text.encode("utf-8"))
-    scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, [[0, 0, 1], [1, 0, 2], [0, 1, 3]])
-    assert scan.num_dropped == text.count("nan")
+def test_text_of_points(text: str, tmp_path: Path):
+    for suffix in ("xyz", "txt", "csv"):
+        scan = read_scan(put(tmp_path / f"a.{suffix}", text))
+        np.testing.assert_array_equal(scan.points, [[0, 0, 1], [1, 0, 2], [0, 1, 3]])
+        assert scan.num_dropped == text.count("nan")
 
 
 def test_three_more_columns_are_normals_or_colors(tmp_path: Path):
