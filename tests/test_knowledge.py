@@ -75,26 +75,21 @@ def run(
 
 def poses_of(scene: Scene, off: Mapping[str, Pose] | None = None) -> PoseSet:
     """The true poses of a scene in a frame of their own, some moved away from the truth."""
-    world = Pose.exp([0.3, -0.2, 1.0, 40.0, 5.0, -30.0])
+    world, off = Pose.exp([0.3, -0.2, 1.0, 40.0, 5.0, -30.0]), off or {}
     poses = {
-        name: world @ (off or {}).get(name, Pose.identity()) @ pose
+        name: world @ off.get(name, Pose.identity()) @ pose
         for name, pose in scene.world_from_scan.items()
     }
     return PoseSet(poses=poses, components=(tuple(poses),))
 
 
-def off_by(result: Reconstruction, scene: Scene, a: str, b: str) -> tuple[float, float]:
-    """Error of the pose of b relative to a: degrees, and shift of b's middle in diameters."""
-    found = result.poses[a].inverse() @ result.poses[b]
-    true = scene.world_from_scan[a].inverse() @ scene.world_from_scan[b]
-    scan = next(scan for scan in scene.scans if scan.name == b)
-    apart = true.inverse() @ found
-    return apart.angle_deg(), apart.shift_at(np.mean(scan.points, axis=0)) / 210.0
-
-
 def assert_right(result: Reconstruction, scene: Scene, a: str = FIRST, b: str = SECOND) -> None:
-    angle, shift = off_by(result, scene, a, b)
-    assert angle < 3 and shift < 0.015
+    """The pose of b relative to a: degrees, and shift of b's middle in diameters."""
+    names = [scan.name for scan in scene.scans]
+    true = scene.i_from_j(names.index(a), names.index(b))
+    apart = true.inverse() @ result.poses[a].inverse() @ result.poses[b]
+    middle = np.mean(scene.scans[names.index(b)].points, axis=0)
+    assert apart.angle_deg() < 3 and apart.shift_at(middle) / 210.0 < 0.015
 
 
 def verdicts(result: Reconstruction) -> dict[str, FactVerdict]:

@@ -1,8 +1,11 @@
-"""What is given beforehand, on drawn pairs with known truth: axes, weights of start poses."""
+"""Users' facts as files give them, and on drawn pairs with known truth: axes, start poses."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,18 +13,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanweld.config import PairsConfig
+from scanweld.errors import KnowledgeError
 from scanweld.evidence.field import ScanField
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.graph.assemble import build_view_graph
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
+from scanweld.io import PoseSet, write_poses
 from scanweld.knowledge.by_index import IndexedKnowledge
+from scanweld.knowledge.facts import Knowledge, read_knowledge
 from scanweld.knowledge.turntable import Turntable, find_turntable, off_axis_doubts
 from scanweld.knowledge.usable_pairs import LenientVerdict, usable_pairs, with_found_pairs
 from scanweld.pairs.anchors import even_anchors
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
+from scanweld.pipeline import run as pipeline
 from tests.prepared import creature_pair
-from tests.scenes import random_motion
+from tests.scenes import primitive_scene, random_motion
 from tests.view_graphs import (
     CENTRE,
     SAME,
@@ -217,3 +224,58 @@ def test_a_start_pose_is_marked_unless_the_search_finds_it_too(num_anchors: int)
     assert len(found) == (0 if num_anchors == 8 else 1)
     assert right[0].is_given is not bool(found)
     assert not any(option.is_given for option in alone.alternatives)
+
+
+# Facts from files, and such as cannot be meant.
+
+
+STRANGERS = PoseSet(poses={"x": Pose.identity()}, components=(("x",),))
+
+
+@pytest.mark.parametrize(
+    ("known", "told"),
+    [
+        ({"fix": ("nobody",)}, "fix: no scan is called nobody; there are scan_01"),
+        ({"together": (("scan_01", "nobody"),)}, "together: no scan is called nobody"),
+        ({"apart": (("nobody", "scan_01"),)}, "apart: no scan is called nobody"),
+        ({"start": STRANGERS}, "start: has a pose for none of the scans"),
+        ({"together": (("a", "b"),), "apart": (("b", "a"),)}, "a and b are .*together and apart"),
+        ({"apart": (("a", "a"),)}, "a is named twice"),
+    ],
+)
+def test_facts_about_no_scan_or_that_deny_each_other_are_errors(known: dict[str, Any], told: str):
+    with pytest.raises(KnowledgeError, match=told):
+        pipeline.run(primitive_scene("box", pixels=30).scans, knowledge=Knowledge(**known))
+
+
+def test_facts_from_a_file(tmp_path: Path):
+    poses = PoseSet(poses={"a": Pose.identity()}, components=(("a",),))
+    write_poses(tmp_path / "poses.json", poses)
+    file = tmp_path / "facts.json"
+    told = {"fix": ["a"], "start": "poses.json", "together": [["b", "a"]], "turntable": True}
+    file.write_text(json.dumps(told))
+    known = read_knowledge(file)
+    assert known.fix == ("a",) and known.together == (("a", "b"),) and known.turntable
+    assert known.start is not None and set(known.start.poses) == {"a"}
+    more = known.joined(Knowledge(fix=("c",), apart=(("a", "c"),)))
+    assert more.fix == ("a", "c") and more.start is known.start and more.apart == (("a", "c"),)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("{", "cannot be read as JSON"),
+        ('{"turn_table": true}', "turn_table"),
+        ('{"together": [["a"]]}', "together"),
+        ("[]", "the file"),
+        (None, r"facts\.json: No such file"),
+    ],
+)
+def test_files_that_are_no_facts_are_named(tmp_path: Path, text: str | None, told: str):
+    file = tmp_path / "facts.json"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(KnowledgeError, match=told) as raised:
+        read_knowledge(file)
+    assert str(file) in str(raised.value) and "\n" not in str(raised.value)
+    assert text is not None or "correct it" not in str(raised.value)
