@@ -1,5 +1,7 @@
 """The table under an object: found and left out where there is one, and nothing else is."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import trimesh
@@ -9,6 +11,7 @@ from scanweld.evaluation.primitives import box, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline.intake import take_in
@@ -61,11 +64,9 @@ def test_what_is_left_out_is_the_table_and_nothing_else(azimuth_deg: float):
     assert not left_out[height > 3.0 * spacing].any()
 
 
-def without_table(scans: list[RangeScan], config: Config | None = None) -> dict[str, bool]:
-    """Of each scan's work hash, whether its table is left out."""
+def taken_in(scans: list[RangeScan], config: Config | None = None) -> Sequence[PreparedScan]:
     stages = Stages(workers=1, cache=NoCache(), progress=silent)
-    taken = take_in(scans, {}, Knowledge(), config or Config(), stages).prepared
-    return {scan.work_hash: scan.is_without_support for scan in taken}
+    return take_in(scans, {}, Knowledge(), config or Config(), stages).prepared
 
 
 def test_the_prepared_scan_shows_the_object_alone():
@@ -99,9 +100,13 @@ def test_an_object_without_a_table_has_none(body: str):
 def test_a_table_in_most_scans_is_left_out_of_these_unless_the_settings_keep_it():
     with_table = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0, 270.0)]
     alone = [seen(small_creature(), azimuth) for azimuth in (0.0, 90.0, 180.0, 270.0)]
-    mostly = without_table([*with_table[:3], alone[3]])
-    assert list(mostly.values()) == [True, True, True, False]
-    assert not any(without_table([*alone[:3], with_table[3]]).values())
-    kept = without_table(with_table[:3], Config(prepare=PrepareConfig(support="kept")))
-    assert not any(kept.values())
-    assert not set(kept) & set(mostly), "work on a scan with its table is none on one without"
+    mostly = taken_in([*with_table[:3], alone[3]])
+    assert {scan.name: scan.is_without_support for scan in mostly} == {
+        **dict.fromkeys(["at 0", "at 90", "at 180"], True),
+        "at 270": False,
+    }
+    few = taken_in([*alone[:3], with_table[3]])
+    kept = taken_in(with_table[:3], Config(prepare=PrepareConfig(support="kept")))
+    assert not any(scan.is_without_support for scan in (*few, *kept))
+    hashes = {scan.work_hash for scan in (*mostly, *kept)}
+    assert len(hashes) == 7, "work on a scan with its table is none on one without"
