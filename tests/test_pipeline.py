@@ -232,7 +232,7 @@ def test_a_model_that_cannot_be_fused_is_not_passed_over(monkeypatch: pytest.Mon
         raise InputError("no surface")
 
     monkeypatch.setattr(steps, "fuse", refuse)
-    result = run(few()[:2], cache=few_run()[1])
+    result = run(few()[:2])
     assert len(result.poses) == 2 and result.mesh is None
     assert result.verdict is Verdict.PARTIAL
     assert result.reasons == ("the placed scans could not be fused into a model",)
