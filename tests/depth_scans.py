@@ -78,6 +78,3 @@ def kind_at(scan: PreparedScan, x: float, y: float) -> PixelKind:
 def angles_deg(a: FloatArray, b: FloatArray) -> FloatArray:
     sine = np.linalg.norm(np.cross(a, b), axis=-1)
     return np.degrees(np.arctan2(sine, (a * b).sum(axis=-1)))
-
-
-# What the sensor saw

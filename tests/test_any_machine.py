@@ -9,9 +9,8 @@ import pytest
 
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import view_of
-from scanweld.io import write_scan_ply
 from scanweld.io.names import path_from
-from tests.scenes import small_creature
+from tests.scenes import small_creature, write_scans
 
 HIDDEN = """
 import os, sys, warnings
@@ -36,17 +35,6 @@ max_voxels_across = 50
 """
 
 
-@pytest.fixture(scope="module")
-def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("scans")
-    mesh = small_creature()
-    for azimuth in (0, 25):
-        view = view_of(mesh, azimuth, 20, pixels=60)
-        scan = scan_mesh(mesh, view.camera, view.world_from_sensor)
-        write_scan_ply(folder / f"at_{azimuth}.ply", scan)
-    return folder
-
-
 def elsewhere(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """A command on a machine that lacks all that is hidden."""
     command = [sys.executable, "-c", COMMAND, *map(str, arguments)]
@@ -55,30 +43,27 @@ def elsewhere(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_help_is_shown():
-    done = elsewhere("--help")
-    assert done.returncode == 0, done.stderr
-    assert "simulate" in done.stdout
-
-
-def test_scan_is_described(scans: Path):
-    done = elsewhere("info", scans / "at_0.ply")
-    assert done.returncode == 0, done.stderr
-    assert "at_0" in done.stdout
-
-
-def test_run_writes_a_model(scans: Path, tmp_path: Path):
+@pytest.mark.slow
+def test_commands_work_and_a_run_writes_a_model(tmp_path: Path):
+    mesh = small_creature()
+    for azimuth in (0, 25):
+        view = view_of(mesh, azimuth, 20, pixels=60)
+        scan = scan_mesh(mesh, view.camera, view.world_from_sensor, name=f"at_{azimuth}")
+        write_scans(tmp_path / "scans", [scan])
+    done = elsewhere("info", tmp_path / "scans" / "at_0.ply")
+    assert done.returncode == 0 and "at_0" in done.stdout, done.stderr
     (tmp_path / "small.toml").write_text(SETTINGS, encoding="utf-8")
     output = tmp_path / "model"
-    done = elsewhere("run", scans, "-o", output, "--config", tmp_path / "small.toml")
+    done = elsewhere("run", tmp_path / "scans", "-o", output, "--config", tmp_path / "small.toml")
     assert done.returncode in (0, 3), done.stderr
     report = json.loads((output / "report.json").read_text(encoding="utf-8"))
     assert set(report["scans"]) == {"at_0", "at_25"}
     assert report["stages"]["pairs"]["peak_mb"] == 0
     assert (output / "report.html").is_file()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["model", "small.toml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["model", "scans", "small.toml"]
 
 
+@pytest.mark.slow
 def test_one_run_at_a_time(tmp_path: Path):
     program = f"""{HIDDEN}
 from pathlib import Path

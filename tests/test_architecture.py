@@ -26,16 +26,13 @@ def test_the_package_imports_downward_and_in_no_circle():
     assert set(complaints(module_graph(SOURCE, "scanweld"))) - KNOWN == set()
 
 
-@pytest.mark.parametrize("folder", ["benchmarks", "examples"])
-def test_what_uses_the_package_imports_in_no_circle(folder: str):
-    assert _circles_of_scripts(folder) - KNOWN == set()
+def test_what_uses_the_package_imports_in_no_circle():
+    for folder in ("benchmarks", "examples"):
+        assert _circles_of_scripts(folder) - KNOWN == set()
 
 
-def test_few_modules_stand_in_the_root_of_the_package():
+def test_few_modules_stand_in_the_root_and_functions_take_few_parameters():
     assert len(list(SOURCE.glob("*.py"))) <= MAX_ROOT_MODULES
-
-
-def test_functions_take_few_parameters():
     assert set(_long_calls(SOURCE)) - KNOWN == set()
 
 
@@ -46,13 +43,10 @@ def test_nothing_is_known_that_no_longer_stands():
     assert found >= KNOWN
 
 
-def test_the_picture_is_that_of_the_imports():
+def test_the_picture_is_that_of_the_imports_and_the_page_names_every_room():
     made = architecture.picture(room_graph(module_graph(SOURCE, "scanweld")))
     committed = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
     assert committed == made, "run python docs/architecture.py"
-
-
-def test_the_page_names_every_room():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     folders = {path.name for path in SOURCE.iterdir() if (path / "__init__.py").exists()}
     assert {room for room in folders if f"`{room}`" not in page} == set()
@@ -76,23 +70,17 @@ def test_imports_are_found_in_every_form(tmp_path: Path):
     }
 
 
-def test_scripts_import_those_beside_them(tmp_path: Path):
-    _write(tmp_path, "run.py", "from sets import a\nimport os")
-    _write(tmp_path, "sets.py", "import pkg.run")
-    graph = module_graph(tmp_path, "pkg", scripts=True)
-    assert graph == {"pkg.run": {"pkg.sets"}, "pkg.sets": {"pkg.run"}}
-    assert module_graph(tmp_path, "pkg")["pkg.run"] == set()
-
-
-def test_a_circle_is_told_once_and_without_detours():
+def test_circles_and_arrows_upward_and_sideways_are_told_once(tmp_path: Path):
     graph = {"a": {"b"}, "b": {"c", "d"}, "c": {"d"}, "d": {"b"}, "e": {"f"}, "f": {"e", "a"}}
     assert circles(graph) == [["b", "d", "b"], ["e", "f", "e"]]
     assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
-
-
-def test_arrows_upward_and_sideways_are_told():
     rooms = {"geometry": {"io", "errors"}, "heat": {"evidence"}, "pairs": {"heat"}}
     assert not_downward(rooms) == [("geometry", "io"), ("heat", "evidence")]
+    _write(tmp_path, "run.py", "from sets import a\nimport os")
+    _write(tmp_path, "sets.py", "import pkg.run")
+    scripts = module_graph(tmp_path, "pkg", scripts=True)
+    assert scripts == {"pkg.run": {"pkg.sets"}, "pkg.sets": {"pkg.run"}}
+    assert module_graph(tmp_path, "pkg")["pkg.run"] == set()
 
 
 def test_rooms_without_a_layer_are_told():

@@ -6,6 +6,7 @@ from urllib.parse import unquote
 
 import pytest
 
+import scanweld
 from benchmarks.study.pages import CONSTANT, constant
 from scanweld.config import Config
 from scanweld.evidence import rivals
@@ -75,3 +76,11 @@ def test_report_page_gives_the_limits_of_the_code():
         f"up to `prepare.num_samples` ({config.prepare.num_samples})",
     ):
         assert told in text, told
+
+
+def test_the_api_page_shows_every_public_name_once():
+    shown = re.findall(r"^::: scanweld\.(\w+)$", (DOCS / "api.md").read_text("utf-8"), re.MULTILINE)
+    assert sorted(shown) == sorted(scanweld.__all__)
+    for name in scanweld.__all__:
+        assert name == "Event" or getattr(scanweld, name).__doc__, name
+    assert re.fullmatch(r"\d+\.\d+\.\d+.*", scanweld.__version__)

@@ -1,4 +1,4 @@
-"""The examples do what they say."""
+"""The examples do what they say: what a run of each prints."""
 
 import re
 import runpy
@@ -17,59 +17,37 @@ from tests.results import a_result
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-def output_of(name: str, capsys: pytest.CaptureFixture[str]) -> str:
+SLOW = pytest.mark.slow
+SAYS = {
+    "00_run_rendered.py": (r"\Agood: 5 of 5 scans are placed", r"ply: ([5-9]\d{3}|\d{5,}) faces"),
+    "01_one_pair.py": (r"\Agood: ", r"the best pose is 0\.[0-4]\d* deg off"),
+    "02_own_format.py": ("viewpoint  given", "viewpoint  estimated"),
+    "03_view_graph.py": (
+        r"(?s)(^scan_\d\d = scan_\d\d  good.*){4}",
+        r"(?s)\A(?!.*^component in .*^component in ).*^component in the frame of ",
+    ),
+    "04_correct_and_resume.py": (
+        r"\Afirst (good|doubtful): 4 scans are placed",
+        r"\b10 pieces of work were found again",
+        r"apart scan_\d\d scan_\d\d: contradicted",
+    ),
+    "05_fuse_known_poses.py": (r"\b([5-9]\d{3}|\d{5,}) faces",),
+    "06_evaluate.py": ("of 5 scans: 3 right, 1 wrong, 1 unplaced",),
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=SLOW if name[:2] in ("00", "03", "04") else ()) for name in SAYS],
+)
+def test_examples_do_what_they_say(name: str, capsys: pytest.CaptureFixture[str]):
     runpy.run_path(str(EXAMPLES / name), run_name="__main__")
-    return capsys.readouterr().out
+    text = capsys.readouterr().out
+    for pattern in SAYS[name]:
+        assert re.search(pattern, text, re.MULTILINE), text
 
 
-def number(pattern: str, text: str) -> float:
-    found = re.search(pattern, text)
-    assert found is not None, text
-    return float(found[1])
-
-
-@pytest.mark.slow
-def test_run_rendered(capsys: pytest.CaptureFixture[str]):
-    text = output_of("00_run_rendered.py", capsys)
-    assert text.startswith("good: 5 of 5 scans are placed")
-    assert number(r"model.ply: (\d+) faces", text) > 5000
-
-
-def test_one_pair(capsys: pytest.CaptureFixture[str]):
-    text = output_of("01_one_pair.py", capsys)
-    assert text.startswith("good: ")
-    assert number(r"the best pose is (\S+) deg off", text) < 0.5
-
-
-def test_own_format(capsys: pytest.CaptureFixture[str]):
-    text = output_of("02_own_format.py", capsys)
-    assert "viewpoint  given" in text and "viewpoint  estimated" in text
-
-
-@pytest.mark.slow
-def test_view_graph(capsys: pytest.CaptureFixture[str]):
-    text = output_of("03_view_graph.py", capsys)
-    assert len(re.findall(r"^scan_\d\d = scan_\d\d  good", text, re.MULTILINE)) >= 4
-    assert len(re.findall(r"^component in the frame of ", text, re.MULTILINE)) == 1
-
-
-def test_correct_and_resume(capsys: pytest.CaptureFixture[str]):
-    text = output_of("04_correct_and_resume.py", capsys)
-    assert re.match(r"first (good|doubtful): 4 scans are placed", text)
-    assert number(r"(\d+) pieces of work were found again", text) == 4 + 6
-    assert re.search(r"apart scan_\d\d scan_\d\d: contradicted", text)
-
-
-def test_fuse_known_poses(capsys: pytest.CaptureFixture[str]):
-    assert number(r"(\d+) faces", output_of("05_fuse_known_poses.py", capsys)) > 5000
-
-
-def test_evaluate(capsys: pytest.CaptureFixture[str]):
-    text = output_of("06_evaluate.py", capsys)
-    assert "of 5 scans: 3 right, 1 wrong, 1 unplaced" in text
-
-
-@pytest.mark.slow
+@SLOW
 @pytest.mark.parametrize(("off_deg", "code"), [(0.0, 0), (10.0, 3)])
 def test_demo_succeeds_only_if_all_is_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, off_deg: float, code: int

@@ -39,9 +39,7 @@ def off_text(vertices: np.ndarray, faces: np.ndarray) -> str:
     vertices=nps.arrays(np.float64, (5, 3), elements=st.floats(-1e9, 1e9)),
     faces=nps.arrays(np.int64, (4, 3), elements=st.integers(0, 4)),
 )
-def test_obj_and_off_are_read_exactly(
-    vertices: np.ndarray, faces: np.ndarray, tmp_path: Path
-) -> None:
+def test_obj_and_off_are_read_exactly(vertices: np.ndarray, faces: np.ndarray, tmp_path: Path):
     for name, text in (("a.obj", obj_text(vertices, faces)), ("a.off", off_text(vertices, faces))):
         mesh = read_mesh(put(tmp_path / name, text))
         np.testing.assert_array_equal(mesh.vertices, vertices)
@@ -49,7 +47,7 @@ def test_obj_and_off_are_read_exactly(
 
 
 @pytest.mark.parametrize("suffix", ["obj", "off", "stl", "ply"])
-def test_what_another_program_writes_is_read(suffix: str, tmp_path: Path) -> None:
+def test_what_another_program_writes_is_read(suffix: str, tmp_path: Path):
     path = tmp_path / f"ball.{suffix}"
     ball = trimesh.creation.icosphere(subdivisions=2, radius=3.0)
     ball.export(path)
@@ -58,7 +56,7 @@ def test_what_another_program_writes_is_read(suffix: str, tmp_path: Path) -> Non
     np.testing.assert_allclose(mesh.vertices[mesh.faces], ball.triangles, atol=1e-6)
 
 
-def test_obj_corners_of_all_kinds_and_none(tmp_path: Path) -> None:
+def test_obj_corners_of_all_kinds_and_none(tmp_path: Path):
     text = """# a square and a triangle
     mtllib some.mtl
     v 0 0 0 1.0 0.0 0.5
@@ -81,7 +79,7 @@ def test_obj_corners_of_all_kinds_and_none(tmp_path: Path) -> None:
     np.testing.assert_array_equal(scan.points, [[1, 2, 3], [4, 5, 6]])
 
 
-def test_off_with_everything(tmp_path: Path) -> None:
+def test_off_with_everything(tmp_path: Path):
     text = "CNOFF 3 1 0 # counts here\n\n0 0 0 0 0 1 255 0 0 255\n1 0 0 0 0 1 0 9 0 255\n"
     text += "0 1 0 0 0 1 0 0 9 255\n3 0 1 2 0.5 0.5 0.5\n"
     mesh = read_mesh(put(tmp_path / "a.off", text))
@@ -96,7 +94,7 @@ def stl_bytes(corners: np.ndarray, head: bytes = b"solid binary nonetheless") ->
     return head.ljust(80, b"\0") + struct.pack("<I", len(corners)) + facets
 
 
-def test_a_binary_stl_has_a_vertex_where_corners_coincide_and_is_whole(tmp_path: Path) -> None:
+def test_a_binary_stl_has_a_vertex_where_corners_coincide_and_is_whole(tmp_path: Path):
     collapsed = np.array([[[0, 0, 0], [1, 0, 0], [1, 0, 0]]])
     path = tmp_path / "a.stl"
     path.write_bytes(stl_bytes(np.concatenate([TETRAHEDRON[FACES], collapsed, -0.0 * collapsed])))
@@ -112,7 +110,7 @@ def test_a_binary_stl_has_a_vertex_where_corners_coincide_and_is_whole(tmp_path:
             read_scan(path)
 
 
-def test_ascii_stl(tmp_path: Path) -> None:
+def test_ascii_stl(tmp_path: Path):
     facets = "".join(
         "facet normal 0 0 1\nouter loop\n"
         + "".join(f"vertex {x:g} {y:g} {z:e}\n" for x, y, z in facet)
@@ -134,16 +132,14 @@ def test_ascii_stl(tmp_path: Path) -> None:
         "0 0 1\n1 0 2\nnan 1.#QNAN 0\n0 1 3\n",
     ],
 )
-@pytest.mark.parametrize("suffix", ["xyz", "txt", "csv"])
-def test_text_of_points(text: str, suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"a.{suffix}"
-    path.write_bytes(text.encode("utf-8"))
-    scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, [[0, 0, 1], [1, 0, 2], [0, 1, 3]])
-    assert scan.num_dropped == text.count("nan")
+def test_text_of_points(text: str, tmp_path: Path):
+    for suffix in ("xyz", "txt", "csv"):
+        scan = read_scan(put(tmp_path / f"a.{suffix}", text))
+        np.testing.assert_array_equal(scan.points, [[0, 0, 1], [1, 0, 2], [0, 1, 3]])
+        assert scan.num_dropped == text.count("nan")
 
 
-def test_three_more_columns_are_normals_or_colors(tmp_path: Path) -> None:
+def test_three_more_columns_are_normals_or_colors(tmp_path: Path):
     normals = read_scan(put(tmp_path / "a.xyz", "0 0 0 0 0.6 0.8\n1 0 0 0 0 -1\n1 1 1 0 0 0\n"))
     assert normals.normals is not None and normals.colors is None
     np.testing.assert_array_equal(normals.normals, [[0, 0.6, 0.8], [0, 0, -1], [0, 0, 0]])
@@ -178,6 +174,12 @@ def test_three_more_columns_are_normals_or_colors(tmp_path: Path) -> None:
         ("a.off", "OFF\n1 1 0\n0 0 0\n3 0 0\n", "line 4: '3 0 0' is broken"),
         ("a.off", "OFF\n1 1 0\n0 y 0\n3 0 0 0\n", "line 3: '0 y 0' is broken"),
         ("a.off", "OFF\n1 1 0\n0 0 0\n3 0 0 7\n", "name point 7"),
+        # Superscripts are digits to Python and no numbers.
+        (
+            "a.ply",
+            "ply\nformat ascii 1.0\nelement vertex 3²\nend_header\n",
+            "is not 'element NAME COUNT'",
+        ),
         ("a.stl", "just some text\n", "not an STL file"),
         ("a.stl", "solid a\nvertex 0 0 0\nvertex 1 0 0\nendsolid\n", "2 corners"),
         ("a.stl", "solid a\nvertex 0 0 0\nvertex 1 0 0\n", "truncated"),
@@ -185,9 +187,7 @@ def test_three_more_columns_are_normals_or_colors(tmp_path: Path) -> None:
         ("a.stl", "solid a\nendsolid\n", "holds no points"),
     ],
 )
-def test_broken_files_are_refused_in_one_line(
-    name: str, text: str, says: str, tmp_path: Path
-) -> None:
+def test_broken_files_are_refused_in_one_line(name: str, text: str, says: str, tmp_path: Path):
     path = put(tmp_path / name, text)
     with pytest.raises(ReadError, match=says) as caught:
         read_scan(path)
@@ -216,7 +216,7 @@ SEEDS = {
 )
 def test_damaged_files_give_a_scan_or_a_read_error(
     name: str, edits: list[tuple[int, int, bytes]], tmp_path: Path
-) -> None:
+):
     data = SEEDS[name]
     for at, length, instead in edits:
         data = data[:at] + instead + data[at + length :]

@@ -11,7 +11,7 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.geometry.prepared import PixelKind, PreparedScan
+from scanweld.geometry.prepared import PixelKind
 from scanweld.preparation import prepare
 from scanweld.preparation.silhouette import classify_pixels, close
 from tests.depth_scans import (
@@ -25,81 +25,55 @@ from tests.depth_scans import (
 )
 
 
-def ring() -> PreparedScan:
-    """A flat ring, radii 20 and 50, from above."""
+def test_an_enclosed_hole_is_unknown_and_the_outside_is_free():
+    """A flat ring, radii 20 and 50, from above. Free pixels know how far outside they are."""
     made = trimesh.creation.annulus(r_min=20, r_max=50, height=10, sections=128)
     mesh = TriangleMesh(vertices=np.asarray(made.vertices), faces=np.asarray(made.faces))
     view = view_of(mesh, 0, 90, pixels=120, model=CameraModel.ORTHOGRAPHIC)
-    return prepare(scan_mesh(mesh, view.camera, view.world_from_sensor), CONFIG)
-
-
-def test_an_enclosed_hole_is_unknown_and_the_outside_is_free():
-    scan = ring()
+    scan = prepare(scan_mesh(mesh, view.camera, view.world_from_sensor), CONFIG)
     x, y = xy_of(scan)
     radius, kind = np.hypot(x, y), scan.image.kind
     slack = 1.5 * scan.image.pixel
     assert (kind[radius < 20 - slack] == PixelKind.UNKNOWN).all()
     assert (kind[(radius > 20 + slack) & (radius < 50 - slack)] == PixelKind.SURFACE).all()
-    assert scan.scan.camera is not None
-    reach = 0.5 * scan.scan.camera.width / scan.scan.camera.fx
+    reach = 0.5 * view.camera.width / view.camera.fx
     in_view = np.maximum(np.abs(x), np.abs(y)) < reach - scan.image.pixel
     assert (kind[in_view & (radius > 50 + slack)] == PixelKind.FREE).all()
     assert (kind[np.maximum(np.abs(x), np.abs(y)) > reach] == PixelKind.UNKNOWN).all()
-
-
-def test_free_pixels_know_how_far_outside_they_are():
-    scan = ring()
-    x, y = xy_of(scan)
-    is_free = scan.image.kind == PixelKind.FREE
-    expected = np.hypot(x, y)[is_free] - 50
-    np.testing.assert_allclose(scan.image.outside[is_free], expected, atol=1.5 * scan.image.pixel)
-    assert (scan.image.outside[~is_free] == 0).all()
-
-
-def test_the_image_has_free_space_all_around():
-    """The border of the image is as wide as the closing: no surface touches it."""
-    for model in MODELS:
-        kind = ball(model)[0].image.kind
-        border = np.concatenate([kind[0], kind[-1], kind[:, 0], kind[:, -1]])
-        assert set(border) <= {PixelKind.FREE, PixelKind.UNKNOWN}
+    outside, is_free = scan.image.outside, kind == PixelKind.FREE
+    np.testing.assert_allclose(outside[is_free], radius[is_free] - 50, atol=slack)
+    assert (outside[~is_free] == 0).all()
 
 
 def test_beyond_the_field_of_view_nothing_is_known():
-    """The right half of the patch is outside the image: there is no free space to the right."""
+    """The right half of the patch is outside the image: there is no free space to the right.
+
+    A horseshoe, open to the right, where the image ends: its inside may be a hole.
+    """
     depth = bumps()
-    whole, cut = (
-        prepare(scan_of_depth(depth), CONFIG),
-        prepare(scan_of_depth(depth[:, :45]), CONFIG),
-    )
+    whole, cut = (prepare(scan_of_depth(d), CONFIG) for d in (depth, depth[:, :45]))
     for x in (46.0, 48.0):
         assert kind_at(whole, x, 45) is PixelKind.SURFACE
         assert kind_at(cut, x, 45) is PixelKind.UNKNOWN
-    x, _ = xy_of(cut)
-    assert (cut.image.kind[x > 45] == PixelKind.UNKNOWN).all()
+    assert (cut.image.kind[xy_of(cut)[0] > 45] == PixelKind.UNKNOWN).all()
     for scan in (whole, cut):
         assert kind_at(scan, 11, 45) is PixelKind.FREE
         assert kind_at(scan, 30, 11) is PixelKind.FREE
-
-
-def test_a_gap_that_the_field_of_view_cuts_off_is_unknown():
-    """A horseshoe, open to the right, where the image ends: its inside may be a hole."""
-    depth = bumps()
     depth[30:60, 30:] = np.nan
-    whole, cut = (
-        prepare(scan_of_depth(depth), CONFIG),
-        prepare(scan_of_depth(depth[:, :70]), CONFIG),
-    )
+    whole, cut = (prepare(scan_of_depth(d), CONFIG) for d in (depth, depth[:, :70]))
     assert kind_at(whole, 60, 45) is PixelKind.FREE
     assert kind_at(cut, 60, 45) is PixelKind.UNKNOWN
     assert kind_at(cut, 40, 11) is PixelKind.FREE
 
 
-def test_without_a_camera_the_field_of_view_is_not_held_against_the_scan():
-    scan = scan_of_depth(bumps()[:, :45])
-    blind = replace(scan, camera=None, grid=None)
-    prepared = prepare(blind, CONFIG)
-    assert prepared.image.camera.model is CameraModel.ORTHOGRAPHIC
-    assert (prepared.image.kind == PixelKind.FREE).any()
+def test_every_image_has_free_space_all_around():
+    """As wide as the closing, no surface touches the border; also where there is no camera."""
+    blind = replace(scan_of_depth(bumps()[:, :45]), camera=None, grid=None)
+    for scan in (*(ball(model)[0] for model in MODELS), prepare(blind, CONFIG)):
+        kind = scan.image.kind
+        border = np.concatenate([kind[0], kind[-1], kind[:, 0], kind[:, -1]])
+        assert set(border) <= {PixelKind.FREE, PixelKind.UNKNOWN}
+        assert (kind == PixelKind.FREE).any()
 
 
 def test_lost_returns_are_filled_or_unknown_never_free():
@@ -133,15 +107,9 @@ def test_a_narrow_notch_is_unknown_a_wide_one_free():
     assert narrow[25, 40] == PixelKind.UNKNOWN
     assert wide[25, 40] == PixelKind.FREE
     assert outside[25, 40] == pytest.approx(12, abs=1.5)
-
-
-def test_closing_changes_nothing_convex_and_shrinks_nothing():
+    # Closing changes nothing convex and shrinks nothing.
     v, u = np.mgrid[:60, :60]
-    disc = np.hypot(u - 30, v - 30) <= 15
+    disc, comb = np.hypot(u - 30, v - 30) <= 15, notched(4)
     np.testing.assert_array_equal(close(disc, 6.0), disc)
-    comb = notched(4)
     assert (close(comb, 4.0) >= comb).all() and close(comb, 4.0)[30, 40]
     np.testing.assert_array_equal(close(comb, 0.0), comb)
-
-
-# Jumps, rims, pieces

@@ -20,7 +20,7 @@ PROGRAM = """
 import os, sys, threading, time
 from scanweld.app.cache import FileCache
 from scanweld.app.job import run_job
-from scanweld.config import Config, FusionConfig
+from scanweld.config import Config, FusionConfig, PairsConfig
 
 scans, output, journal, moment, delay = sys.argv[1:]
 put, calls = FileCache.put, 0
@@ -45,7 +45,8 @@ def progress(event):
 
 
 FileCache.put = put_and_tell
-config = Config(fusion=FusionConfig(max_voxels_across=60))
+pairs = PairsConfig(num_anchors=8, num_turns=8, num_survivors=(40, 10))
+config = Config(pairs=pairs, fusion=FusionConfig(max_voxels_across=60))
 run_job([scans], output, config, workers=1, force=True, progress=progress)
 print(calls)
 """
@@ -58,10 +59,9 @@ It ends as if killed, which not all systems know: at once, with nothing tidied u
 def run(
     scans: Path, output: Path, journal: Path, moment: int = 0, delay: float = 0.0
 ) -> subprocess.CompletedProcess[str]:
-    arguments = [str(x) for x in (scans, output, journal, moment, delay)]
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, text=True, check=False
-    )
+    arguments = map(str, (scans, output, journal, moment, delay))
+    command = [sys.executable, "-c", PROGRAM, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -76,7 +76,7 @@ def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same
     tmp_path: Path,
 ):
     """Moments are spread over all of a run; each goes on from what the one before it left."""
-    scans = write_scans(tmp_path / "scans", creature_scene(4, pixels=70.0).scans)
+    scans = write_scans(tmp_path / "scans", creature_scene(4, pixels=60.0).scans)
     undisturbed, journal = tmp_path / "undisturbed", tmp_path / "journal"
     whole = run(scans, undisturbed, journal)
     assert whole.returncode == 0, whole.stderr

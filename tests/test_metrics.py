@@ -22,6 +22,7 @@ from scanweld.io.poses import PoseSet
 from tests.scenes import creature_scene, random_motion
 
 NAMES = tuple("abcdef")
+AT_HOME = dict.fromkeys("abc", Pose.identity())
 
 
 def reference_poses(seed: int = 0) -> dict[str, Pose]:
@@ -35,10 +36,6 @@ def in_parts(poses: dict[str, Pose], *components: Sequence[str]) -> PoseSet:
 
 def turned(degrees: float) -> Pose:
     return Pose.exp([0.0, 0.0, np.radians(degrees), 0.0, 0.0, 0.0])
-
-
-def shifted(length: float) -> Pose:
-    return Pose(rotation=np.eye(3), translation=np.array([0.0, length, 0.0]))
 
 
 def test_the_truth_is_right_in_any_frame():
@@ -58,9 +55,8 @@ def test_the_truth_is_right_in_any_frame():
 
 def test_ties_go_to_the_gauge_with_the_smallest_mean_error():
     """Turns of 0, 1 and 2 degrees about one axis: the gauge is the middle one."""
-    reference = {name: Pose.identity() for name in "abc"}
-    estimate = {"a": turned(0), "b": turned(1), "c": turned(2)}
-    errors = evaluate_poses(in_parts(estimate, "abc"), reference, diameter=1.0)
+    estimate = {name: turned(degrees) for degrees, name in enumerate("abc")}
+    errors = evaluate_poses(in_parts(estimate, "abc"), AT_HOME, diameter=1.0)
     assert errors.rotations_deg == pytest.approx([1, 0, 1], abs=1e-9)
 
 
@@ -91,13 +87,10 @@ def test_unplaced_and_foreign_scans_nothing_placed_and_no_common_name():
         evaluate_poses(in_parts({"x": Pose.identity()}, "x"), reference_poses())
 
 
-@pytest.mark.parametrize(
-    ("shift", "standing"), [(1.4, Standing.RIGHT), (1.6, Standing.WRONG)], ids=["below", "above"]
-)
+@pytest.mark.parametrize(("shift", "standing"), [(1.4, Standing.RIGHT), (1.6, Standing.WRONG)])
 def test_a_shift_is_judged_in_percent_of_the_diameter(shift: float, standing: Standing):
-    reference = {name: Pose.identity() for name in "abc"}
-    estimate = {**reference, "c": shifted(shift)}
-    errors = evaluate_poses(in_parts(estimate, "abc"), reference, diameter=100.0)
+    estimate = {**AT_HOME, "c": Pose.exp([0, 0, 0, 0, shift, 0])}
+    errors = evaluate_poses(in_parts(estimate, "abc"), AT_HOME, diameter=100.0)
     assert errors.scans["c"].standing is standing
     assert errors.scans["c"].translation == pytest.approx(shift)
     assert errors.translations_percent.max() == pytest.approx(shift)
@@ -107,16 +100,21 @@ def test_translation_is_taken_at_the_centroid():
     """A turn about the centroid moves it nowhere, wherever the frame's origin is."""
     centroid = np.array([100.0, 50.0, 0.0])
     about = Pose(rotation=np.eye(3), translation=centroid)
-    reference = {name: Pose.identity() for name in "abc"}
-    estimate = {**reference, "c": about @ turned(2) @ about.inverse()}
-    centroids = {name: centroid for name in "abc"}
-    errors = evaluate_poses(
-        in_parts(estimate, "abc"), reference, centroids=centroids, diameter=10.0
-    )
+    estimate = in_parts({**AT_HOME, "c": about @ turned(2) @ about.inverse()}, "abc")
+    centroids = dict.fromkeys("abc", centroid)
+    errors = evaluate_poses(estimate, AT_HOME, centroids=centroids, diameter=10.0)
     assert errors.scans["c"].translation < 1e-9
-    at_origin = evaluate_poses(in_parts(estimate, "abc"), reference)
+    at_origin = evaluate_poses(estimate, AT_HOME)
     assert at_origin.scans["c"].translation > 3
     assert at_origin.scans["c"].standing is Standing.RIGHT
+    scene = creature_scene(4, pixels=60)
+    diameter = object_diameter(scene.scans, scene.world_from_scan)
+    extent = np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0))
+    assert 0.8 * extent < diameter < 1.1 * extent
+    for name, centroid in scan_centroids(scene.scans).items():
+        world = scene.world_from_scan[name].apply(centroid)
+        assert (world > scene.mesh.vertices.min(axis=0)).all()
+        assert (world < scene.mesh.vertices.max(axis=0)).all()
 
 
 @settings(max_examples=25, deadline=None)
@@ -141,30 +139,20 @@ def test_errors_do_not_depend_on_frames(seed: int):
     assert [e.standing for e in after.scans.values()] == [e.standing for e in before.scans.values()]
 
 
-def test_diameter_and_centroids_of_a_scene():
-    scene = creature_scene(4, pixels=60)
-    diameter = object_diameter(scene.scans, scene.world_from_scan)
-    extent = np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0))
-    assert 0.8 * extent < diameter < 1.1 * extent
-    for name, centroid in scan_centroids(scene.scans).items():
-        world = scene.world_from_scan[name].apply(centroid)
-        assert (world > scene.mesh.vertices.min(axis=0)).all()
-        assert (world < scene.mesh.vertices.max(axis=0)).all()
-
-
-@pytest.mark.slow
 def test_surface_errors_of_concentric_balls():
-    """Radii 50 and 51: every point is 1 away, and half the ball covers half of it."""
+    """Radii 50 and 51: every point is 1 away, and half the ball covers half of it.
+
+    Of 20,000 samples a share of one half is off by 0.0035 as a rule: 0.02 is nearly six times that.
+    """
     inner, outer = sphere(50.0), sphere(51.0)
     errors = surface_errors(outer, inner, tolerance=1.1, num_samples=4000)
-    assert errors.accuracy_median == pytest.approx(1.0, abs=0.03)
+    assert errors.accuracy_median == pytest.approx(1.0, abs=0.02)
     assert errors.accuracy_99 == pytest.approx(1.0, abs=0.06)
     assert errors.completeness == 1.0
     upper = inner.vertices[inner.faces].mean(axis=1)[:, 2] > 0
     half = TriangleMesh(vertices=inner.vertices, faces=inner.faces[upper])
-    assert surface_errors(half, inner, 0.5, num_samples=4000).completeness == pytest.approx(
-        0.5, abs=0.03
-    )
+    errors = surface_errors(half, inner, 0.5, num_samples=20000)
+    assert errors.completeness == pytest.approx(0.5, abs=0.02)
     assert surface_errors(inner, half, 0.5, num_samples=4000).accuracy_90 > 10
 
 

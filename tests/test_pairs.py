@@ -1,6 +1,6 @@
 """Pair registration from any start pose: exact truth found, and what must not be believed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -26,7 +26,7 @@ from tests.prepared import PreparedPair, creature_pair, pair_of_scene, prepared_
 from tests.scenes import primitive_scene, scene_of
 
 CONFIG = PairsConfig()
-MODELS = (CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC)
+PINHOLE, ORTHOGRAPHIC = CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC
 
 
 @lru_cache
@@ -39,14 +39,11 @@ def registered(pair: PreparedPair, config: PairsConfig = CONFIG) -> PairResult:
         pair_anchors(field, features_of(scan), config)
         for field, scan in zip(pair.fields, pair.scans, strict=True)
     ]
-    both = list(zip(*anchors, strict=True))
-    return register_pair(pair.problem(config), both)
+    return register_pair(pair.problem(config), list(zip(*anchors, strict=True)))
 
 
 @lru_cache
-def creature_result(
-    gap: float, model: CameraModel = CameraModel.PINHOLE, factor: float = 1.0
-) -> PairResult:
+def creature_result(gap: float, model: CameraModel = PINHOLE, factor: float = 1.0) -> PairResult:
     return registered(creature_pair(gap, model, factor))
 
 
@@ -56,40 +53,45 @@ def best_pose(result: PairResult) -> Pose:
 
 
 def swapped(pair: PreparedPair) -> PreparedPair:
-    return PreparedPair(
-        scans=(pair.scans[1], pair.scans[0]),
-        fields=(pair.fields[1], pair.fields[0]),
-        i_from_j=pair.i_from_j.inverse(),
-        diameter=pair.diameter,
-    )
+    i_from_j = pair.i_from_j.inverse()
+    return replace(pair, scans=pair.scans[::-1], fields=pair.fields[::-1], i_from_j=i_from_j)
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("gap", [30, 60, 90])
+def assert_found(pair: PreparedPair, found: Pose) -> None:
+    degrees, shift = pair.off_by(found)
+    assert degrees < 0.5 and shift < 0.005
+
+
+@pytest.mark.parametrize(
+    ("gap", "model"), [(30, PINHOLE), (60, PINHOLE), (90, PINHOLE), (90, ORTHOGRAPHIC)]
+)
 def test_the_truth_is_found_from_any_start_pose(gap: float, model: CameraModel):
     pair, result = creature_pair(gap, model), creature_result(gap, model)
-    degrees, shift = pair.off_by(best_pose(result))
-    assert degrees < 0.5 and shift < 0.005
+    assert_found(pair, best_pose(result))
     assert result.kind is PairKind.GOOD and result.reason == ""
     assert result.best is not None and result.best.score > CONFIG.min_score
     assert 0 < result.rms < 0.003 * pair.diameter
+    information = result.information
+    np.testing.assert_allclose(information, information.T, atol=1e-12)
+    eigenvalues = np.linalg.eigvalsh(information)
+    assert eigenvalues[0] > 0
+    assert result.observability == pytest.approx(eigenvalues[0] / eigenvalues[-1])
+    # Directions are unit vectors: the translation block of each match has trace 1, less noise.
+    assert 0.97 < np.trace(information[3:, 3:]) < 1.0
 
 
 @pytest.mark.parametrize("keypoints", ["heat", "even"])
 def test_either_kind_of_anchors_alone_finds_it(keypoints: str):
-    pair = creature_pair(30)
-    result = registered(pair, CONFIG.model_copy(update={"keypoints": keypoints}))
-    degrees, shift = pair.off_by(best_pose(result))
-    assert degrees < 0.5 and shift < 0.005
+    config = CONFIG.model_copy(update={"keypoints": keypoints})
+    assert_found(creature_pair(30), best_pose(registered(creature_pair(30), config)))
 
 
 def test_alternatives_are_distinct_and_in_order():
-    result = creature_result(60)
+    pair, result = creature_pair(60), creature_result(60)
     scores = [option.score for option in result.alternatives]
     assert scores == sorted(scores, reverse=True)
     assert 1 < len(scores) <= CONFIG.num_alternatives
     assert result.margin == pytest.approx(min(1.0, (scores[0] - scores[1]) / scores[0]))
-    pair = creature_pair(60)
     for a, p in enumerate(result.alternatives):
         for q in result.alternatives[:a]:
             apart = p.i_from_j.inverse() @ q.i_from_j
@@ -118,14 +120,13 @@ def test_an_answer_is_no_rival_of_itself():
 
 
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "plate"])
-@pytest.mark.parametrize("other", [1, 2])
-def test_surfaces_that_slide_or_repeat_are_never_good(name: str, other: int):
-    result = registered(pair_of_scene(primitive_scene(name), 0, other))
+def test_surfaces_that_slide_or_repeat_are_never_good(name: str):
+    result = registered(pair_of_scene(primitive_scene(name), 0, 1))
     assert result.kind in (PairKind.SLIDING, PairKind.AMBIGUOUS)
+    assert result.reason
     if name != "plate":
         assert result.kind is PairKind.SLIDING
         assert result.observability < CONFIG.min_observability
-    assert result.reason
 
 
 @pytest.mark.parametrize("gap", [45, 180])
@@ -137,7 +138,7 @@ def test_a_cube_is_ambiguous(gap: float):
     assert result.margin < CONFIG.min_margin and "another pose" in result.reason
 
 
-@pytest.mark.parametrize("name", ["sphere", "box", "cylinder"])
+@pytest.mark.parametrize("name", ["sphere", "box"])
 def test_scans_of_different_objects_are_not_good(name: str):
     mine, theirs = creature_pair(60).scans[0].scan, primitive_scene(name).scans[0]
     result = registered(prepared_pair(mine, theirs, Pose.identity()))
@@ -145,7 +146,7 @@ def test_scans_of_different_objects_are_not_good(name: str):
 
 
 def test_another_unit_changes_nothing_but_the_unit():
-    near, far = creature_result(60), creature_result(60, CameraModel.PINHOLE, 1000.0)
+    near, far = creature_result(60), creature_result(60, PINHOLE, 1000.0)
     assert far.kind is near.kind
     assert far.observability == pytest.approx(near.observability, rel=1e-3)
     assert far.rms == pytest.approx(1000 * near.rms, rel=1e-3)
@@ -154,40 +155,16 @@ def test_another_unit_changes_nothing_but_the_unit():
     np.testing.assert_allclose(b.translation, 1000 * a.translation, atol=10.0)
 
 
-def test_the_same_bytes_twice():
-    a, b = creature_result(60), registered(creature_pair(60))
-    assert a.information.tobytes() == b.information.tobytes()
-    assert [o.evidence for o in a.alternatives] == [o.evidence for o in b.alternatives]
-    for p, q in zip(a.alternatives, b.alternatives, strict=True):
-        assert p.i_from_j.matrix().tobytes() == q.i_from_j.matrix().tobytes()
-
-
 def test_swapping_the_scans_inverts_the_pose():
+    """Information is about the matches' centroid: swapping turns it, but its spectrum stays."""
     pair = creature_pair(60)
     result = registered(swapped(pair))
     apart = best_pose(result) @ best_pose(creature_result(60))
     assert apart.angle_deg() < 0.3
     assert apart.shift_at(pair.fields[1].centre) < 0.002 * pair.diameter
     assert result.kind is PairKind.GOOD
-
-
-@pytest.mark.parametrize("gap", [30, 60])
-def test_information_is_symmetric_and_positive(gap: float):
-    information = creature_result(gap).information
-    np.testing.assert_allclose(information, information.T, atol=1e-12)
-    eigenvalues = np.linalg.eigvalsh(information)
-    assert eigenvalues[0] > 0
-    assert creature_result(gap).observability == pytest.approx(eigenvalues[0] / eigenvalues[-1])
-    # Directions are unit vectors: the translation block of each match has trace 1, less noise.
-    assert 0.97 < np.trace(information[3:, 3:]) < 1.0
-
-
-def test_information_does_not_depend_on_the_frame_of_the_pair():
-    """About the matches' centroid: swapping the scans turns it, but its spectrum stays."""
-    pair = creature_pair(60)
-    spectra = []
+    spectra, radius = [], 0.012 * pair.diameter
     for each in (pair, swapped(pair)):
-        radius = 0.012 * pair.diameter
         information, rms, count = information_of(*each.fields, each.i_from_j, radius, pair.diameter)
         assert count > 200 and rms < radius
         spectra.append(np.linalg.eigvalsh(information))
@@ -198,16 +175,12 @@ def test_information_does_not_depend_on_the_frame_of_the_pair():
 
 
 def schedule(pair: PreparedPair, rounds: int = 15, first: float = 0.05) -> IcpSchedule:
-    return IcpSchedule(
-        num_rounds=rounds,
-        first_radius=first * pair.diameter,
-        last_radius=0.01 * pair.diameter,
-        num_samples=400,
-    )
+    first, last = first * pair.diameter, 0.01 * pair.diameter
+    return IcpSchedule(num_rounds=rounds, first_radius=first, last_radius=last, num_samples=400)
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("gap", [30, 60, 90])
+@pytest.mark.parametrize("model", [PINHOLE, ORTHOGRAPHIC])
+@pytest.mark.parametrize("gap", [30, 90])
 def test_icp_stays_at_the_truth(gap: float, model: CameraModel):
     pair = creature_pair(gap, model)
     refined = icp(*pair.fields, pose_rows([pair.i_from_j]), schedule(pair), pair.diameter)
@@ -215,15 +188,14 @@ def test_icp_stays_at_the_truth(gap: float, model: CameraModel):
     assert degrees < 0.4 and shift < 0.002
 
 
-def test_icp_returns_to_the_truth():
+def test_icp_returns_to_the_truth_and_leaves_a_pose_without_matches_alone():
     pair = creature_pair(30)
     rng = np.random.default_rng(2)
     middle = Pose(rotation=np.eye(3), translation=pair.fields[1].centre)
     starts = []
     for _ in range(8):
-        twist = rng.normal(size=6)
-        twist[:3] *= np.radians(6) / np.linalg.norm(twist[:3])
-        twist[3:] *= 0.02 * pair.diameter / np.linalg.norm(twist[3:])
+        turn, shift = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+        twist = np.concatenate([np.radians(6) * turn, 0.02 * pair.diameter * shift])
         starts.append(pair.i_from_j @ middle @ Pose.exp(twist) @ middle.inverse())
     wide = schedule(pair, rounds=20, first=0.08)
     refined = icp(*pair.fields, pose_rows(starts), wide, pair.diameter)
@@ -231,14 +203,8 @@ def test_icp_returns_to_the_truth():
     assert (errors[:, 0] < 0.4).all() and (errors[:, 1] < 0.003).all()
     turns = refined[:, :9].reshape(-1, 3, 3)
     np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), [np.eye(3)] * 8, atol=1e-12)
-
-
-def test_icp_leaves_a_pose_without_matches_alone():
-    pair = creature_pair(30)
-    far = Pose(rotation=np.eye(3), translation=np.array([50.0 * pair.diameter, 0, 0]))
-    rows = pose_rows([far])
-    refined = icp(*pair.fields, rows, schedule(pair), pair.diameter)
-    np.testing.assert_array_equal(refined, rows)
+    far = pose_rows([Pose.exp([0, 0, 0, 50.0 * pair.diameter, 0, 0])])
+    np.testing.assert_array_equal(icp(*pair.fields, far, wide, pair.diameter), far)
 
 
 # Hypotheses
@@ -265,7 +231,7 @@ def test_hypotheses_lay_anchor_on_anchor():
         assert len({tuple(np.round(row, 6)) for row in rows}) == len(rows)
 
 
-def test_the_sweep_finds_hypotheses_near_the_truth():
+def test_the_sweep_finds_hypotheses_near_the_truth_and_without_anchors_none():
     pair = creature_pair(30)
     a, b = (even_anchors(field, CONFIG.num_anchors) for field in pair.fields)
     rows, scores = sweep(*pair.fields, a, b, CONFIG.num_turns, 0.04 * pair.diameter, 200)
@@ -273,10 +239,6 @@ def test_the_sweep_finds_hypotheses_near_the_truth():
     is_near = (errors[:, 0] < 15) & (errors[:, 1] < 0.08)
     assert is_near[:30].any()
     assert scores.max() < 1 and (np.diff(scores) <= 0).all()
-
-
-def test_without_anchors_there_are_no_hypotheses():
-    pair = creature_pair(30)
     none = Anchors(points=np.zeros((0, 3)), normals=np.zeros((0, 3)))
     rows, scores = sweep(*pair.fields, none, none, 8, 1.0, 10)
     assert rows.shape == (0, 12) and scores.shape == (0,)
@@ -285,16 +247,12 @@ def test_without_anchors_there_are_no_hypotheses():
 
 
 def test_even_anchors_leave_no_part_of_a_scan_out():
-    (field, _), number = creature_pair(30).fields, 40
-    anchors = even_anchors(field, number)
-    assert len(anchors.points) == number
-    apart = np.linalg.norm(anchors.points[:, None] - anchors.points, axis=2)
-    apart[np.diag_indices_from(apart)] = np.inf
-    reach = np.linalg.norm(field.points[:, None] - anchors.points, axis=2).min(axis=1)
+    field = creature_pair(30).fields[0]
+    anchors = even_anchors(field, 40).points
+    assert len(anchors) == 40
+    apart = np.linalg.norm(anchors[:, None] - anchors, axis=2) + np.diag(np.full(40, np.inf))
+    reach = np.linalg.norm(field.points[:, None] - anchors, axis=2).min(axis=1)
     assert reach.max() <= apart.min()
-
-
-# Distinct poses
 
 
 def test_distinct_poses_drop_what_is_near_a_better_one():
@@ -305,13 +263,10 @@ def test_distinct_poses_drop_what_is_near_a_better_one():
         return Pose(rotation=turn, translation=centre - turn @ centre + [shift, 0, 0])
 
     poses = [about_centre(*p) for p in [(0, 0), (5, 0.5), (5, 2), (20, 0), (22, 0.9), (0, 1.5)]]
-    chosen = distinct_poses(pose_rows(poses), centre, np.radians(8), 1.0, 10)
-    assert chosen.tolist() == [0, 2, 3]
-    assert distinct_poses(pose_rows(poses), centre, np.radians(8), 1.0, 2).tolist() == [0, 2]
+    for most in (10, 2):
+        chosen = distinct_poses(pose_rows(poses), centre, np.radians(8), 1.0, most)
+        assert chosen.tolist() == [0, 2, 3][:most]
     assert distinct_poses(pose_rows([]), centre, 0.1, 1.0, 5).tolist() == []
-
-
-def test_distinct_poses_are_kept_in_order():
     rng = np.random.default_rng(3)
     poses = [Pose(rotation=random_rotation(rng), translation=np.zeros(3)) for _ in range(30)]
     chosen = distinct_poses(pose_rows(poses), np.zeros(3), np.radians(40), 1.0, 30)

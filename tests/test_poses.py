@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanweld.errors import ReadError
@@ -20,7 +20,7 @@ SCALED = (np.eye(4) * [2, 2, 2, 1]).tolist()
 MIRRORED = (np.eye(4) * [1, 1, -1, 1]).tolist()
 
 
-def assert_same(a: PoseSet, b: PoseSet) -> None:
+def assert_same(a: PoseSet, b: PoseSet):
     assert a.components == b.components
     assert a.unplaced == b.unplaced
     assert set(a.poses) == set(b.poses)
@@ -28,6 +28,7 @@ def assert_same(a: PoseSet, b: PoseSet) -> None:
         np.testing.assert_array_equal(pose.matrix(), b.poses[name].matrix())
 
 
+@settings(max_examples=30)
 @given(
     names=st.lists(st.text(st.characters(codec="utf-8"), max_size=8), unique=True, max_size=8),
     cuts=st.tuples(st.integers(0, 8), st.integers(0, 8)),
@@ -35,7 +36,7 @@ def assert_same(a: PoseSet, b: PoseSet) -> None:
 )
 def test_written_poses_are_read_back_exactly(
     names: list[str], cuts: tuple[int, int], seed: int, tmp_path: Path
-) -> None:
+):
     first, second = sorted(cuts)
     parts = (tuple(names[:first]), tuple(names[first:second]))
     rng = np.random.default_rng(seed)
@@ -53,34 +54,30 @@ def test_written_poses_are_read_back_exactly(
     assert path.read_bytes() == written
 
 
-def test_what_is_written_has_the_promised_form_whatever_the_order(tmp_path: Path) -> None:
-    rng = np.random.default_rng(5)
-    names = ("scan10", "scan2", "büste")
-    poses = PoseSet(
-        poses={name: random_motion(rng, 100.0) for name in names},
-        components=(("scan2", "scan10"), ("büste",)),
-        unplaced={"b": "too small", "a": "empty"},
-    )
-    write_poses(tmp_path / "poses.json", poses)
-    text = (tmp_path / "poses.json").read_text(encoding="utf-8")
+def test_what_is_written_has_the_promised_form_whatever_the_order(tmp_path: Path):
+    rng, path = np.random.default_rng(5), tmp_path / "poses.json"
+    poses = {name: random_motion(rng, 100.0) for name in ("scan10", "scan2", "büste")}
+    written = set()
+    for order in (list(poses), sorted(poses)):
+        made = PoseSet(
+            poses={name: poses[name] for name in order},
+            components=(("scan2", "scan10"), ("büste",)),
+            unplaced={"b": "too small", "a": "empty"},
+        )
+        write_poses(path, made)
+        written.add(path.read_text(encoding="utf-8"))
+    (text,) = written
     content = json.loads(text)
     assert list(content) == ["format", "convention", "scans", "components", "unplaced"]
     assert content["format"] == 1
-    assert list(content["scans"]) == ["büste", "scan2", "scan10"]
+    assert list(content["scans"]) == ["büste", "scan2", "scan10"] and "büste" in text
     assert content["components"] == [["scan2", "scan10"], ["büste"]]
     assert list(content["unplaced"].items()) == [("a", "empty"), ("b", "too small")]
-    assert "büste" in text
     row = json.dumps(content["scans"]["scan2"][0])
     assert any(line.strip().rstrip(",") == row for line in text.splitlines())
-    rng = np.random.default_rng(6)
-    poses = {name: random_motion(rng, 100.0) for name in ("c", "a", "b")}
-    for k, order in enumerate(("abc", "cab")):
-        same = PoseSet(poses={name: poses[name] for name in order}, components=(tuple("abc"),))
-        write_poses(tmp_path / f"{k}.json", same)
-    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
 
 
-def test_without_components_all_scans_are_one(tmp_path: Path) -> None:
+def test_without_components_all_scans_are_one(tmp_path: Path):
     path = tmp_path / "flat.json"
     path.write_text("\ufeff" + json.dumps({"b": IDENTITY, "a": IDENTITY}), encoding="utf-8")
     poses = read_poses(path)
@@ -116,7 +113,7 @@ def test_without_components_all_scans_are_one(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str) -> None:
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str):
     path = tmp_path / "poses.json"
     with pytest.raises(ReadError, match=re.escape(str(path))):
         read_poses(path)
@@ -127,18 +124,16 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, says: str)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "components", [(), (("a",),), (("a", "b"), ("b",)), (("a", "a", "b"),), (("a", "b", "c"),)]
-)
-def test_components_name_every_placed_scan_once(components: tuple[tuple[str, ...], ...]) -> None:
+@pytest.mark.parametrize("parts", ["", "a", "ab b", "aab", "abc"])
+def test_components_name_every_placed_scan_once(parts: str):
     poses = {"a": Pose.identity(), "b": Pose.identity()}
     with pytest.raises(ValueError, match="every placed scan"):
-        PoseSet(poses=poses, components=components)
+        PoseSet(poses=poses, components=tuple(map(tuple, parts.split())))
 
 
 @pytest.mark.parametrize("folder", ["stanford-bunny", "stanford-dragon"])
 @pytest.mark.parametrize("name", ["poses.json", "poses_conf.json"])
-def test_reference_poses_keep_their_digits(folder: str, name: str) -> None:
+def test_reference_poses_keep_their_digits(folder: str, name: str):
     path = require_data(f"{folder}/{name}")
     content = json.loads(path.read_text(encoding="utf-8"))
     poses = read_poses(path).poses

@@ -11,7 +11,6 @@ from scanweld.errors import InputError
 from scanweld.evaluation.primitives import box
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import view_of
-from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import face_normals
 from scanweld.geometry.pose import Pose
@@ -36,11 +35,11 @@ from tests.scenes import random_motion
 @pytest.mark.parametrize("model", MODELS)
 def test_the_image_and_the_normals_of_a_ball_are_the_ball(model: CameraModel):
     scan, centre = ball(model)
-    image = scan.image
+    image, points = scan.image, scan.image.points()
     has = np.isfinite(image.depth)
     assert image.camera.model is model
     np.testing.assert_array_equal(image.kind == PixelKind.SURFACE, has)
-    radii = np.linalg.norm(image.points()[has & ~image.is_rim] - centre, axis=1)
+    radii = np.linalg.norm(points[has & ~image.is_rim] - centre, axis=1)
     np.testing.assert_allclose(radii, RADIUS, atol=0.3 * image.pixel)
     assert scan.diameter == pytest.approx(2 * RADIUS * np.sqrt(2.25), rel=0.04)
     assert image.pixel == pytest.approx(scan.resolution, rel=1e-9)
@@ -49,32 +48,33 @@ def test_the_image_and_the_normals_of_a_ball_are_the_ball(model: CameraModel):
         half_angle = np.arcsin(RADIUS / np.linalg.norm(centre))
         radius = np.median(image.depth[has]) * np.tan(half_angle)
     assert has.sum() * image.pixel**2 == pytest.approx(np.pi * radius**2, rel=0.06)
-    points = image.points()
-    outward = (points - centre) / RADIUS
-    facing = -np.einsum("hwk,hwk->hw", image.camera.view_directions(points), outward)
-    has = np.isfinite(image.depth)
+    outward, rays = (points - centre) / RADIUS, image.camera.view_directions(points)
+    facing = -np.einsum("hwk,hwk->hw", rays, outward)
     np.testing.assert_allclose(np.linalg.norm(image.normals[has], axis=1), 1.0)
     inner = has & ~image.is_rim & (np.nan_to_num(facing) > 0.3)
     off = angles_deg(image.normals[inner], outward[inner])
     assert np.median(off) < 0.7 and off.max() < 4.0
-    toward = np.einsum("hwk,hwk->hw", image.camera.view_directions(points), image.normals)
-    assert (toward[has] < 0).all()
+    assert (np.einsum("hwk,hwk->hw", rays, image.normals)[has] < 0).all()
     off = angles_deg(scan.samples.normals, (scan.samples.points - centre) / RADIUS)
     assert np.median(off) < 0.7
 
 
-def test_the_mesh_is_the_image():
+def test_the_mesh_is_the_image_and_the_rim_surrounds_it():
     """Vertices are the surface pixels in row-major order; faces look to the sensor."""
     scan = creature_pair(30).scans[0]
     image, mesh = scan.image, scan.mesh
     has = np.isfinite(image.depth)
     np.testing.assert_array_equal(mesh.vertices, image.points()[has])
     np.testing.assert_array_equal(mesh.normals, image.normals[has])
-    middle = mesh.vertices[mesh.faces].mean(axis=1)
-    looks = np.einsum("fk,fk->f", face_normals(mesh.vertices, mesh.faces), middle)
-    assert (looks < 0).all()
-    depth = mesh.vertices[mesh.faces][..., 2]
-    assert np.ptp(depth, axis=1).max() <= CONFIG.jump_pixels * image.pixel
+    corners = mesh.vertices[mesh.faces]
+    looks = face_normals(mesh.vertices, mesh.faces) * corners.mean(axis=1)
+    assert (looks.sum(axis=1) < 0).all()
+    assert np.ptp(corners[..., 2], axis=1).max() <= CONFIG.jump_pixels * image.pixel
+    assert not (image.is_rim & ~has).any()
+    beside = np.zeros_like(has)
+    beside[1:-1, 1:-1] = ~(has[:-2, 1:-1] & has[2:, 1:-1] & has[1:-1, :-2] & has[1:-1, 2:])
+    assert image.is_rim[has & beside].all()
+    assert 0.05 < image.is_rim[has].mean() < 0.6
 
 
 # Free and unknown
@@ -103,16 +103,6 @@ def test_the_surface_is_cut_at_a_jump_and_both_sides_are_rim():
     assert not scan.image.is_rim[round(45 + scan.image.camera.cy), round(45 + scan.image.camera.cx)]
 
 
-def test_the_rim_surrounds_the_surface():
-    image = creature_pair(30).scans[0].image
-    has = np.isfinite(image.depth)
-    assert not (image.is_rim & ~has).any()
-    beside = np.zeros_like(has)
-    beside[1:-1, 1:-1] = ~(has[:-2, 1:-1] & has[2:, 1:-1] & has[1:-1, :-2] & has[1:-1, 2:])
-    assert image.is_rim[has & beside].all()
-    assert 0.05 < image.is_rim[has].mean() < 0.6
-
-
 def test_tiny_pieces_are_dropped_and_larger_ones_stay():
     depth = bumps()
     depth[4:7, 4:7] = 150.0
@@ -129,16 +119,6 @@ def test_tiny_pieces_are_dropped_and_larger_ones_stay():
 # Samples
 
 
-def test_every_prefix_of_the_samples_is_evenly_spread():
-    scan = creature_pair(30).scans[0]
-    points = scan.samples.points
-    for count in (20, 100, 400):
-        prefix = KDTree(points[:count])
-        spacing = prefix.query(points[:count], k=2)[0][:, 1].min()
-        reach = prefix.query(points)[0].max()
-        assert reach <= spacing + 1e-9
-
-
 def test_samples_are_even_by_area_not_by_pixel():
     """A box at an angle: each face gets its share of the area, however slanted it is."""
     mesh = box(60, 80, 100)
@@ -150,7 +130,8 @@ def test_samples_are_even_by_area_not_by_pixel():
     np.testing.assert_allclose(share, area / area.sum(), atol=0.05)
 
 
-def test_samples_lie_on_the_surface_off_the_rim_and_not_at_grazing_incidence():
+def test_samples_lie_evenly_on_the_surface_off_the_rim_and_not_at_grazing_incidence():
+    """Every prefix of them is as even as all."""
     scan = creature_pair(30).scans[0]
     image, samples = scan.image, scan.samples
     pixels, depth = image.camera.project(samples.points)
@@ -160,14 +141,13 @@ def test_samples_lie_on_the_surface_off_the_rim_and_not_at_grazing_incidence():
     assert not image.is_rim[row, column].any()
     toward = -(image.camera.view_directions(samples.points) * samples.normals).sum(axis=1)
     assert toward.min() > CONFIG.min_cosine
-
-
-def test_as_many_samples_and_pixels_as_asked_for():
-    scan = ball(MODELS[0])[0].scan
-    assert len(prepare(scan, CONFIG).samples.points) == CONFIG.num_samples
-    assert len(prepare(scan, PrepareConfig(num_samples=150)).samples.points) == 150
-    scan = creature_pair(30).scans[0].scan
-    coarse = prepare(scan, PrepareConfig(image_pixels=64))
+    assert len(samples.points) == CONFIG.num_samples
+    for count in (20, 100, 400):
+        prefix = KDTree(samples.points[:count])
+        spacing = prefix.query(samples.points[:count], k=2)[0][:, 1].min()
+        assert prefix.query(samples.points)[0].max() <= spacing + 1e-9
+    assert len(prepare(scan.scan, PrepareConfig(num_samples=150)).samples.points) == 150
+    coarse = prepare(scan.scan, PrepareConfig(image_pixels=64))
     assert coarse.image.pixel == pytest.approx(coarse.diameter / 64)
     assert coarse.resolution < 0.8 * coarse.image.pixel
 
@@ -185,28 +165,21 @@ def test_farthest_points_of_a_line():
 # Other kinds of scans
 
 
-def depths_at(scan: PreparedScan, points: FloatArray) -> FloatArray:
-    pixels, depth = scan.image.camera.project(points)
-    column, row = np.rint(pixels).astype(int).T
-    return scan.image.depth[row, column] - depth
-
-
 @pytest.mark.parametrize("keeps", ["points", "faces"])
 def test_a_scan_without_a_grid_gives_the_same_surface(keeps: str):
     whole = creature_pair(30).scans[0]
-    faces = None
-    if keeps == "faces":
-        faces = whole.mesh.faces
     bare = RangeScan(
         name="bare",
         points=whole.scan_from_sensor.apply(whole.mesh.vertices),
-        faces=faces,
+        faces=whole.mesh.faces if keeps == "faces" else None,
         scan_from_sensor=whole.scan_from_sensor,
         viewpoint=Viewpoint.GIVEN,
     )
     scan = prepare(bare, CONFIG)
     assert scan.diameter == pytest.approx(whole.diameter, rel=0.03)
-    off = depths_at(scan, whole.samples.points)
+    pixels, depth = scan.image.camera.project(whole.samples.points)
+    column, row = np.rint(pixels).astype(int).T
+    off = scan.image.depth[row, column] - depth
     assert np.isfinite(off).mean() > 0.95
     assert np.nanmedian(np.abs(off)) < scan.image.pixel
     nearest = KDTree(whole.samples.points).query(scan.samples.points)[1]
@@ -215,32 +188,24 @@ def test_a_scan_without_a_grid_gives_the_same_surface(keeps: str):
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_moving_a_scan_changes_nothing_seen_from_its_sensor(model: CameraModel):
+@pytest.mark.parametrize("factor", [1.0, 1e-3, 1024.0])
+def test_another_frame_or_unit_changes_nothing_but_the_unit(model: CameraModel, factor: float):
     before = creature_pair(30, model).scans[0]
     motion = random_motion(np.random.default_rng(1), 5e3)
-    after = prepare(moved(before.scan, motion), CONFIG)
-    assert after.resolution == pytest.approx(before.resolution)
-    assert after.diameter == pytest.approx(before.diameter)
-    assert after.image.depth.shape == before.image.depth.shape
-    np.testing.assert_allclose(after.image.depth, before.image.depth, rtol=1e-6)
-    np.testing.assert_array_equal(after.image.kind, before.image.kind)
-    np.testing.assert_allclose(
-        after.scan_from_sensor.matrix(), (motion @ before.scan_from_sensor).matrix(), atol=1e-6
+    after = prepare(
+        moved(before.scan, motion) if factor == 1.0 else scaled(before.scan, factor), CONFIG
     )
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("factor", [1e-3, 1024.0])
-def test_another_unit_changes_nothing_but_the_unit(model: CameraModel, factor: float):
-    before = creature_pair(30, model).scans[0]
-    after = prepare(scaled(before.scan, factor), CONFIG)
-    assert after.resolution == pytest.approx(factor * before.resolution)
-    assert after.diameter == pytest.approx(factor * before.diameter)
+    for name in ("resolution", "diameter"):
+        assert getattr(after, name) == pytest.approx(factor * getattr(before, name))
     assert after.image.pixel == pytest.approx(factor * before.image.pixel)
     np.testing.assert_allclose(after.image.depth, factor * before.image.depth, rtol=1e-6)
+    np.testing.assert_array_equal(after.image.kind, before.image.kind)
     np.testing.assert_allclose(after.image.normals, before.image.normals, atol=1e-5)
     np.testing.assert_allclose(after.image.outside, factor * before.image.outside, rtol=1e-6)
     np.testing.assert_allclose(after.samples.points, factor * before.samples.points, rtol=1e-6)
+    if factor == 1.0:
+        want = (motion @ before.scan_from_sensor).matrix()
+        np.testing.assert_allclose(after.scan_from_sensor.matrix(), want, atol=1e-6)
 
 
 def test_the_content_hash_knows_content_not_name():
@@ -252,10 +217,9 @@ def test_the_content_hash_knows_content_not_name():
 
 
 def test_a_scan_with_hardly_any_surface_or_points_is_refused():
-    rng = np.random.default_rng(0)
     cloud = RangeScan(
         name="dust",
-        points=rng.uniform(-100, 100, size=(120, 3)) + np.array([0, 0, 500]),
+        points=np.random.default_rng(0).uniform(-100, 100, size=(120, 3)) + np.array([0, 0, 500]),
         scan_from_sensor=Pose.identity(),
         viewpoint=Viewpoint.GIVEN,
     )

@@ -88,28 +88,19 @@ def test_what_falls_beside_an_edge_is_forgiven(model: CameraModel):
     assert off_edges.front == pytest.approx(5 / 11)
 
 
-@pytest.mark.parametrize("slope", [0.0, 1.0, 3.0])
-def test_a_slope_is_no_edge(slope: float):
-    columns = np.arange(101) - 50.0
-    scan = wall_with_a_bar(CameraModel.ORTHOGRAPHIC)
-    scan.raster[..., RASTER_DEPTH] = WALL + slope * PIXEL * columns
-    wide = with_wide_edges(scan, 3.0 * PIXEL)
-    assert np.array_equal(wide.raster, scan.raster)
-
-
-def test_what_lies_before_a_surface_all_around_is_not_forgiven():
+def test_what_is_no_edge_is_not_forgiven():
+    """A slope; a border of free space; what lies before a surface all around."""
+    for slope in (0.0, 1.0, 3.0):
+        scan = wall_with_a_bar(CameraModel.ORTHOGRAPHIC)
+        scan.raster[..., RASTER_DEPTH] = WALL + slope * PIXEL * (np.arange(101) - 50.0)
+        assert np.array_equal(with_wide_edges(scan, 3.0 * PIXEL).raster, scan.raster)
     scan = wall_with_a_bar()
-    nearer = Pose(rotation=np.eye(3), translation=np.array([0.0, 0.0, -0.3]))
+    nearer = Pose.exp([0, 0, 0, 0, 0, -0.3])
     both = scan, with_wide_edges(scan, 3.0 * PIXEL)
     # One direction lies before what the other saw, the other one behind it.
     assert evidence_off_edges(both, both, nearer, 0.1).front == pytest.approx(0.5)
-
-
-def test_only_surfaces_are_looked_for_around_a_pixel():
-    scan = wall_with_a_bar()
     scan.raster[:, 45:56, RASTER_KIND] = float(PixelKind.FREE)
-    around = with_wide_edges(scan, 3.0 * PIXEL)
-    assert np.array_equal(around.raster, scan.raster)
+    assert np.array_equal(with_wide_edges(scan, 3.0 * PIXEL).raster, scan.raster)
 
 
 def drifting(at_truth: Evidence) -> Say:
@@ -152,17 +143,12 @@ def chain(
 
 
 def test_a_merge_is_judged_again_once_its_scans_have_settled():
-    judge_pair = drifting(seen(0.3))
+    """From 4 deg off it is the same merge that settles, from 8 deg another one."""
+    judge_pair, world = drifting(seen(0.3)), world_of(3)
     assert scans_of(chain(judge_pair, settles=False).components[0]) == {0, 1}
     (component,) = chain(judge_pair, settles=True).components
     assert scans_of(component) == {0, 1, 2}
-    assert is_same(component.poses[0].inverse() @ component.poses[2], true_pose(world_of(3), 0, 2))
-
-
-def test_what_settles_somewhere_else_is_not_merged():
-    """From 4 deg off it is the same merge that settles, from 8 deg another one."""
-    judge_pair = drifting(seen(0.3))
-    assert 2 not in chain(judge_pair, settles=True).unplaced
+    assert is_same(component.poses[0].inverse() @ component.poses[2], true_pose(world, 0, 2))
     assert 2 in chain(judge_pair, settles=True, off_deg=8.0).unplaced
 
 

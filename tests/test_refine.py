@@ -1,4 +1,4 @@
-"""The joint refinement: exact truth from rendered scans, invariances, and what must not move."""
+"""The joint refinement, and scans whose unit is a little off: exact truth, invariances."""
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -9,21 +9,24 @@ import pytest
 
 from scanweld.config import ContoursConfig, PrepareConfig, RefineConfig
 from scanweld.contours.coherence import contour_matcher
+from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.camera import CameraModel
-from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
+from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.graph.refine_graph import Refined, refine_graph
-from scanweld.graph.view_graph import Component, Edge, ViewGraph
-from scanweld.pairs.result import Alternative
+from scanweld.graph.view_graph import Component, Edge
+from scanweld.pairs.result import PairKind
 from scanweld.preparation import prepare
-from scanweld.refinement.refine import Refinement, refine_poses, scan_rms
+from scanweld.refinement.refine import refine_poses, scan_rms
+from scanweld.refinement.scale import ScaleEstimate, estimate_scales
 from scanweld.refinement.surface_terms import surface_matches, surface_source
 from tests.prepared import scaled
-from tests.scenes import creature_scene
-from tests.view_graphs import DrawnJudge
+from tests.scenes import creature_scene, random_motion
+from tests.view_graphs import DrawnJudge, graph_with, option, pair_of, seen
 
 NUM_SCANS = 6
+ALL = list(combinations(range(NUM_SCANS), 2))
 RING = [(k, (k + 1) % NUM_SCANS) for k in range(NUM_SCANS)]
 
 
@@ -70,10 +73,10 @@ def errors(
     return float(np.mean([p.angle_deg() for p in off])), float(np.mean(shifts)) / scans[0].diameter
 
 
-def assert_same(a: Refinement, b: Refinement, size: float) -> None:
-    for k, pose in a.poses.items():
-        np.testing.assert_allclose(pose.rotation, b.poses[k].rotation, atol=1e-6)
-        np.testing.assert_allclose(pose.translation, b.poses[k].translation, atol=1e-6 * size)
+def assert_same(a: Mapping[int, Pose], b: Mapping[int, Pose], size: float) -> None:
+    for k, pose in a.items():
+        np.testing.assert_allclose(pose.rotation, b[k].rotation, atol=1e-6)
+        np.testing.assert_allclose(pose.translation, b[k].translation, atol=1e-6 * size)
 
 
 @pytest.mark.parametrize("model", [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC])
@@ -93,20 +96,25 @@ def test_truth_is_kept_and_found(
     assert refined.step < 1e-4
 
 
-def test_first_scan_is_the_gauge():
+def test_order_unit_and_frame_do_not_matter():
+    """The first scan is the gauge."""
     scans, truth = ring()
-    refined = refine_poses(scans, start(1.0, 0.01), RING, RefineConfig())
-    assert refined.poses[0] is truth[0]
-    assert set(refined.poses) == set(truth)
-
-
-def test_order_of_the_mapping_does_not_matter():
-    scans, _ = ring()
-    poses = start(1.0, 0.01)
-    a = refine_poses(scans, poses, RING, RefineConfig())
-    b = refine_poses(scans, dict(reversed(poses.items())), RING[::-1], RefineConfig())
+    poses, config = start(1.0, 0.01), RefineConfig()
+    a = refine_poses(scans, poses, RING, config)
+    assert a.poses[0] is truth[0] and set(a.poses) == set(truth)
+    b = refine_poses(scans, dict(reversed(poses.items())), RING[::-1], config)
     for k in poses:
         assert a.poses[k].matrix().tobytes() == b.poses[k].matrix().tobytes()
+    far = refine_poses(ring(factor=1000.0)[0], start(1.0, 0.01, factor=1000.0), RING, config)
+    shrunk = {
+        k: Pose(rotation=pose.rotation, translation=pose.translation / 1000.0)
+        for k, pose in far.poses.items()
+    }
+    assert_same(a.poses, shrunk, scans[0].diameter)
+    assert far.rms == pytest.approx(1000.0 * a.rms, rel=1e-4)
+    motion = random_motion(np.random.default_rng(5), 1.0)
+    there = refine_poses(scans, {k: motion @ p for k, p in poses.items()}, RING, config)
+    assert_same({k: motion @ p for k, p in a.poses.items()}, there.poses, scans[0].diameter)
 
 
 def test_numbering_of_the_scans_does_not_matter():
@@ -114,38 +122,14 @@ def test_numbering_of_the_scans_does_not_matter():
     scans, _ = ring()
     poses = start(1.0, 0.01)
     order = [3, 0, 5, 1, 4, 2]
-    all_pairs = list(combinations(range(NUM_SCANS), 2))
-    a = refine_poses(scans, poses, all_pairs, RefineConfig()).poses
+    a = refine_poses(scans, poses, ALL, RefineConfig()).poses
     shuffled = {n: poses[k] for n, k in enumerate(order)}
-    b = refine_poses([scans[k] for k in order], shuffled, all_pairs, RefineConfig()).poses
+    b = refine_poses([scans[k] for k in order], shuffled, ALL, RefineConfig()).poses
     gauge = a[order[0]] @ b[0].inverse()
     for n, k in enumerate(order):
         off = a[k].inverse() @ gauge @ b[n]
         assert off.angle_deg() < 0.02
         assert off.shift_at(scans[k].mesh.vertices.mean(axis=0)) < 1e-4 * scans[0].diameter
-
-
-def test_unit_of_length_does_not_matter():
-    scans, _ = ring()
-    large, _ = ring(factor=1000.0)
-    a = refine_poses(scans, start(1.0, 0.01), RING, RefineConfig())
-    b = refine_poses(large, start(1.0, 0.01, factor=1000.0), RING, RefineConfig())
-    shrunk = {
-        k: Pose(rotation=pose.rotation, translation=pose.translation / 1000.0)
-        for k, pose in b.poses.items()
-    }
-    assert_same(a, Refinement(poses=shrunk, pairs={}, rms=0.0, step=0.0), scans[0].diameter)
-    assert b.rms == pytest.approx(1000.0 * a.rms, rel=1e-4)
-
-
-def test_moving_the_world_moves_the_poses():
-    scans, _ = ring()
-    poses = start(1.0, 0.01)
-    motion = Pose(rotation=random_rotation(np.random.default_rng(5)), translation=np.ones(3))
-    a = refine_poses(scans, poses, RING, RefineConfig())
-    b = refine_poses(scans, {k: motion @ p for k, p in poses.items()}, RING, RefineConfig())
-    moved = {k: motion @ pose for k, pose in a.poses.items()}
-    assert_same(Refinement(poses=moved, pairs={}, rms=0, step=0), b, scans[0].diameter)
 
 
 def test_scans_that_touch_nothing_stay():
@@ -160,18 +144,14 @@ def test_scans_that_touch_nothing_stay():
     assert alone.pairs == {}
 
 
-def test_residuals_say_how_pairs_lie():
+def test_matches_lie_on_the_other_surface():
+    """At the truth the distances are a small share of a pixel; a rim or a back is never matched."""
     scans, truth = ring()
-    refined = refine_poses(scans, truth, RING, RefineConfig())
+    residuals = refine_poses(scans, truth, RING, RefineConfig()).pairs
     for pair in RING:
-        residual = refined.pairs[min(pair), max(pair)]
+        residual = residuals[min(pair), max(pair)]
         assert residual.num_matches > 150
         assert 0 < residual.rms < 0.5 * scans[0].image.pixel
-
-
-def test_matches_lie_on_the_other_surface():
-    """At the truth the distances are a small share of a pixel; a rim is never matched."""
-    scans, truth = ring()
     i, j = (surface_source(scans[k], 2000) for k in (0, 1))
     matches = surface_matches(i, j, truth[1].inverse() @ truth[0], 0.02 * scans[0].diameter)
     assert len(matches) > 100
@@ -181,47 +161,25 @@ def test_matches_lie_on_the_other_surface():
     )
     columns, rows = np.rint(pixels).astype(int).T
     assert scans[1].image.is_rim[rows, columns].mean() < 0.05
-
-
-def test_back_sides_do_not_match():
-    """A thin wall's two sides lie within the radius, but look different ways."""
-    scans, _ = ring()
-    flip = Pose(rotation=np.diag([-1.0, 1.0, -1.0]), translation=np.zeros(3))
-    source = surface_source(scans[0], 2000)
-    middle = source.points.mean(axis=0)
-    turned = Pose(rotation=flip.rotation, translation=middle - flip.rotation @ middle)
-    assert not len(surface_matches(source, source, turned, 1e-3 * scans[0].diameter))
-    assert len(surface_matches(source, source, Pose.identity(), 1e-3 * scans[0].diameter)) > 1000
-
-
-def graph_at(poses: Mapping[int, Pose]) -> ViewGraph:
-    """One component of all scans, neighbours joined."""
-    to_reference = poses[1].inverse()
-    component = Component(poses={k: to_reference @ pose for k, pose in poses.items()}, reference=1)
-    accepted = {
-        (min(edge), max(edge)): Alternative(i_from_j=Pose.identity(), evidence=evidence(agree=1.0))
-        for edge in RING
-    }
-    return ViewGraph(
-        pairs={}, usable={}, accepted=accepted, rejected={}, components=(component,), unplaced={}
-    )
-
-
-def evidence(agree: float) -> Evidence:
-    return Evidence(
-        agree=agree, front=0.0, contradict=0.0, free=0.0, occluded=1.0 - agree, unknown=0.0
-    )
+    # A thin wall's two sides lie within the radius, but look different ways.
+    flip, middle = np.diag([-1.0, 1.0, -1.0]), i.points.mean(axis=0)
+    turned = Pose(rotation=flip, translation=middle - flip @ middle)
+    assert not len(surface_matches(i, i, turned, 1e-3 * scans[0].diameter))
+    assert len(surface_matches(i, i, Pose.identity(), 1e-3 * scans[0].diameter)) > 1000
 
 
 @pytest.mark.parametrize("is_better", [True, False])
 def test_a_refinement_is_taken_only_if_the_evidence_does_not_suffer(is_better: bool):
     scans, truth = ring()
-    graph = graph_at(start(1.0, 0.005))
-    before = graph.components[0].poses
+    poses = start(1.0, 0.005)
+    before = {k: poses[1].inverse() @ pose for k, pose in poses.items()}
+    edges = [(min(edge), max(edge)) for edge in RING]
+    pairs = {edge: pair_of(*edge, PairKind.GOOD, option(Pose.identity(), 1.0)) for edge in edges}
+    graph = graph_with({}, Component(poses=before, reference=1), accepted=pairs)
 
     def judge(i: int, j: int, i_from_j: Pose) -> Evidence:
         is_start = (before[i].inverse() @ before[j]).inverse() @ i_from_j
-        return evidence(0.5 if (is_start.angle_deg() < 1e-9) == is_better else 0.6)
+        return seen(0.5 if (is_start.angle_deg() < 1e-9) == is_better else 0.6)
 
     matcher = contour_matcher(scans, ContoursConfig())
 
@@ -239,3 +197,61 @@ def test_a_refinement_is_taken_only_if_the_evidence_does_not_suffer(is_better: b
     for k, pose in truth.items():
         assert ((to_truth @ pose).inverse() @ poses[k]).angle_deg() < 0.1
     assert set(refined.rms) == set(truth)
+
+
+# Scans whose unit is a little off are found, and by how much; the others are not blamed.
+
+
+NOISE = NoiseModel(depth_diameters=5e-4)
+
+
+@lru_cache
+def placed(factor: float, unit: float = 1.0) -> tuple[list[PreparedScan], dict[int, Pose]]:
+    """Six scans at their refined poses, the third one too large by a factor."""
+    scene = creature_scene(6, noise=NOISE, seed=3)
+    scans, poses = [], {}
+    for k, scan in enumerate(scene.scans):
+        larger = factor if k == 2 else 1.0
+        scans.append(prepare(scaled(scan, larger * unit), PrepareConfig()))
+        true = scene.world_from_scan[scan.name] @ scan.sensor_pose
+        middle = scan.sensor_pose.inverse().apply(scan.points).mean(axis=0)
+        shift = true.rotation @ (middle - larger * middle)
+        poses[k] = Pose(rotation=true.rotation, translation=unit * (true.translation + shift))
+    return scans, refine_poses(scans, poses, list(combinations(poses, 2)), RefineConfig()).poses
+
+
+def estimates(factor: float, unit: float = 1.0) -> dict[int, ScaleEstimate]:
+    scans, poses = placed(factor, unit)
+    return estimate_scales(scans, poses, list(combinations(poses, 2)))
+
+
+@pytest.mark.parametrize("factor", [1.015, 0.985])
+def test_the_scan_that_is_off_is_named_with_its_factor(factor: float):
+    found = estimates(factor)
+    assert [k for k, estimate in found.items() if estimate.is_off] == [2]
+    assert found[2].factor == pytest.approx(factor, abs=0.25 * abs(factor - 1))
+
+
+def test_scans_in_one_unit_are_not_blamed():
+    found = estimates(1.0)
+    assert not any(estimate.is_off for estimate in found.values())
+    assert max(abs(estimate.factor - 1) for estimate in found.values()) < 0.002
+    assert all(0 < estimate.deviation < 0.005 for estimate in found.values())
+    scans, poses = placed(1.0)
+    apart = {k: Pose.exp([0, 0, 0, 1e4 * k, 0, 0]) @ pose for k, pose in poses.items()}
+    assert estimate_scales(scans, apart, list(combinations(apart, 2))) == {}, "scans that touch nothing have no scale"
+
+
+def test_the_unit_of_all_does_not_matter():
+    mm, m = estimates(1.01), estimates(1.01, 1e-3)
+    for k, estimate in mm.items():
+        assert m[k].factor == pytest.approx(estimate.factor, abs=1e-4)
+
+
+def test_an_uncertain_scale_is_no_accusation_and_words_give_the_factor_to_apply():
+    assert not ScaleEstimate(factor=1.02, deviation=0.01).is_off
+    assert not ScaleEstimate(factor=1.003, deviation=1e-5).is_off
+    assert ScaleEstimate(factor=np.exp(-0.01), deviation=0.002).is_off
+    words = ScaleEstimate(factor=1.0101, deviation=0.0011).words()
+    assert "1.010 times too large" in words and "0.001" in words
+    assert "1.010 times too small" in ScaleEstimate(factor=0.99, deviation=0.001).words()

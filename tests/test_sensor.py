@@ -10,13 +10,15 @@ from hypothesis import strategies as st
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
-from scanweld.geometry.pose import Pose, random_rotation
+from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
 from scanweld.io import read_scan
 from scanweld.preparation.resolution import point_spacing
 from scanweld.preparation.sensor import locate_sensor
 from tests.data import require_data
+from tests.depth_scans import angles_deg
 from tests.prepared import moved
+from tests.scenes import random_motion
 
 PINHOLE = Camera(
     model=CameraModel.PINHOLE, width=200, height=160, fx=220.0, fy=200.0, cx=95.0, cy=83.0
@@ -31,14 +33,8 @@ MIRRORS = {
     "upside down": lambda grid: grid[::-1, ::-1],
     "transposed": lambda grid: grid.T,
 }
-BUNNY = [
-    f"stanford-bunny/{name}.ply"
-    for name in (
-        *("bun000", "bun045", "bun090", "bun180", "bun270", "bun315"),
-        *("chin", "ear_back", "top2", "top3"),
-    )
-]
-DRAGON = [f"stanford-dragon/dragonStandRight_{angle}.ply" for angle in range(0, 360, 24)]
+BUNNY = [f"stanford-bunny/{name}.ply" for name in ("bun000", "bun090", "chin", "top3")]
+DRAGON = [f"stanford-dragon/dragonStandRight_{angle}.ply" for angle in range(0, 360, 72)]
 
 
 def lumpy_depth(x: FloatArray, y: FloatArray) -> FloatArray:
@@ -66,18 +62,12 @@ def organised(image: FloatArray, pose: Pose, name: str = "body") -> RangeScan:
 
 
 def any_pose(seed: int) -> Pose:
-    rng = np.random.default_rng(seed)
-    return Pose(rotation=random_rotation(rng), translation=rng.normal(scale=20, size=3))
+    return random_motion(np.random.default_rng(seed), 20.0)
 
 
 def viewing(scan: RangeScan) -> FloatArray:
     """The viewing direction that was found, in the scan frame."""
-    assert scan.scan_from_sensor is not None
-    return scan.scan_from_sensor.rotation[:, 2]
-
-
-def angle_deg(a: FloatArray, b: FloatArray) -> float:
-    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
+    return scan.sensor_pose.rotation[:, 2]
 
 
 def grid_faces(grid: IntArray) -> IntArray:
@@ -97,26 +87,21 @@ def test_camera_behind_a_grid_is_recovered(camera: Camera, mirror: str):
     assert found.viewpoint is Viewpoint.FITTED and found.grid is not None
     assert found.camera is not None and found.camera.model is camera.model
     assert (found.camera.height, found.camera.width) == found.grid.shape
-    assert found.scan_from_sensor is not None
     rows, columns = np.nonzero(found.grid >= 0)
-    in_sensor = found.scan_from_sensor.inverse().apply(found.points[found.grid[rows, columns]])
+    in_sensor = found.sensor_pose.inverse().apply(found.points[found.grid[rows, columns]])
     pixels, depth = found.camera.project(in_sensor)
     assert np.abs(pixels - np.stack([columns, rows], axis=1)).max() < 1e-6
     assert depth.min() > 0
-    assert angle_deg(viewing(found), pose.rotation[:, 2]) < 1e-5
+    assert angles_deg(viewing(found), pose.rotation[:, 2]) < 1e-5
     if camera.model is CameraModel.PINHOLE:
-        assert np.allclose(found.scan_from_sensor.translation, pose.translation, atol=1e-6)
+        assert np.allclose(found.sensor_pose.translation, pose.translation, atol=1e-6)
         assert sorted([found.camera.fx, found.camera.fy]) == pytest.approx([200, 220], abs=1e-5)
-
-
-def test_pinhole_survives_single_precision_and_a_little_noise():
-    scan = organised(render(PINHOLE), pose := any_pose(3))
-    noise = np.random.default_rng(0).normal(scale=1e-3, size=scan.points.shape)
-    found = locate_sensor(replace(scan, points=(scan.points + noise).astype(np.float32)))
-    assert found.scan_from_sensor is not None and found.camera is not None
-    shift = found.scan_from_sensor.translation - pose.translation
-    assert np.linalg.norm(shift) < 0.01 * 5
-    assert found.camera.fx == pytest.approx(220, rel=0.01)
+        noise = np.random.default_rng(0).normal(scale=1e-3, size=scan.points.shape)
+        single = (scan.points + noise).astype(np.float32)
+        rough = locate_sensor(replace(scan, points=single))
+        shift = rough.sensor_pose.translation - pose.translation
+        assert np.linalg.norm(shift) < 0.01 * 5 and rough.camera is not None
+        assert sorted([rough.camera.fx, rough.camera.fy]) == pytest.approx([200, 220], rel=0.01)
 
 
 @settings(max_examples=10, deadline=None)
@@ -125,7 +110,7 @@ def test_side_of_an_orthographic_grid_does_not_depend_on_frame_or_unit(seed: int
     pose = any_pose(seed)
     scan = organised(render(ORTHOGRAPHIC), pose)
     found = locate_sensor(replace(scan, points=scale * scan.points))
-    assert angle_deg(viewing(found), pose.rotation[:, 2]) < 1e-5
+    assert angles_deg(viewing(found), pose.rotation[:, 2]) < 1e-5
     assert found.camera is not None
     assert found.camera.fx == pytest.approx(50 / scale)
 
@@ -142,7 +127,7 @@ def test_line_scanner_is_seen_along_its_fan(oblique_deg: float):
     centre = pose.inverse().apply(scan.points.mean(axis=0))
     truth = np.array([np.tan(np.radians(oblique_deg / 2)), centre[1] / centre[2], 1.0])
     assert found.camera is None and found.viewpoint is Viewpoint.FITTED
-    assert angle_deg(viewing(found), pose.turn(truth)) < 1.0
+    assert angles_deg(viewing(found), pose.turn(truth)) < 1.0
     assert any("halfway" in note for note in found.notes) == (oblique_deg > 0)
 
 
@@ -152,7 +137,7 @@ def test_real_grids_give_the_viewing_direction_in_any_frame(path: str):
     """Truth: -z of the file; the bunny's rays lean by 3.4 deg, the dragon's camera by 28 deg."""
     scan = read_scan(require_data(path))
     found = locate_sensor(scan)
-    assert angle_deg(viewing(found), np.array([0, 0, -1.0])) < (4 if path in BUNNY else 18)
+    assert angles_deg(viewing(found), np.array([0, 0, -1.0])) < (4 if path in BUNNY else 18)
     assert found.viewpoint is Viewpoint.FITTED
     assert found.scan_from_sensor is not None
     assert found.scan_from_sensor.inverse().apply(scan.points)[:, 2].min() > 0
@@ -161,14 +146,14 @@ def test_real_grids_give_the_viewing_direction_in_any_frame(path: str):
     assert np.abs(viewing(turned) - pose.turn(viewing(found))).max() < 1e-6
 
 
-@pytest.mark.parametrize("path", [BUNNY[0], BUNNY[6], DRAGON[0], DRAGON[9]])
+@pytest.mark.parametrize("path", [BUNNY[0], BUNNY[2], DRAGON[0], DRAGON[3]])
 def test_viewpoint_of_bare_points_is_estimated(path: str):
     scan = replace(read_scan(require_data(path)), grid=None)
     truth = np.array([-0.24 if path in DRAGON else 0, -0.06, -1])
     pose = any_pose(len(scan.points))
     found = locate_sensor(moved(scan, pose))
     assert found.viewpoint is Viewpoint.ESTIMATED and "estimated" in " ".join(found.notes)
-    assert angle_deg(viewing(found), pose.turn(truth)) < 15
+    assert angles_deg(viewing(found), pose.turn(truth)) < 15
 
 
 def test_estimate_turns_with_the_points_and_ignores_the_unit():
@@ -177,8 +162,8 @@ def test_estimate_turns_with_the_points_and_ignores_the_unit():
     pose = any_pose(5)
     found = locate_sensor(scan)
     turned = locate_sensor(replace(scan, points=1e3 * pose.apply(scan.points)))
-    assert angle_deg(viewing(found), np.array([0, 0, 1.0])) < 10
-    assert angle_deg(viewing(turned), pose.turn(viewing(found))) < 1.0
+    assert angles_deg(viewing(found), np.array([0, 0, 1.0])) < 10
+    assert angles_deg(viewing(turned), pose.turn(viewing(found))) < 1.0
 
 
 def test_winding_of_an_open_mesh_and_normals_tell_the_side():
@@ -188,30 +173,30 @@ def test_winding_of_an_open_mesh_and_normals_tell_the_side():
     faces = grid_faces(scan.grid)
     front = locate_sensor(replace(scan, grid=None, faces=faces))
     hollow = locate_sensor(replace(scan, grid=None, faces=faces[:, ::-1]))
-    assert angle_deg(viewing(front), pose.rotation[:, 2]) < 10
-    assert angle_deg(viewing(hollow), -pose.rotation[:, 2]) < 10
+    assert angles_deg(viewing(front), pose.rotation[:, 2]) < 10
+    assert angles_deg(viewing(hollow), -pose.rotation[:, 2]) < 10
     assert any("contradict" in note for note in hollow.notes)
     assert not any("contradict" in note for note in front.notes)
     scan = organised(render(ORTHOGRAPHIC), pose := any_pose(12))
     normals = np.tile(pose.rotation[:, 2], (len(scan.points), 1))
     found = locate_sensor(replace(scan, grid=None, normals=normals))
-    assert angle_deg(viewing(found), -pose.rotation[:, 2]) < 10
+    assert angles_deg(viewing(found), -pose.rotation[:, 2]) < 10
 
 
 def test_complete_model_is_called_one_and_what_is_no_surface_refused():
     rng = np.random.default_rng(0)
-    sphere = rng.normal(size=(4000, 3)) * (1.0, 1.2, 0.8)
-    sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
-    found = locate_sensor(RangeScan(name="sphere", points=sphere))
+    ball = rng.normal(size=(4000, 3)) * (1.0, 1.2, 0.8)
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    found = locate_sensor(RangeScan(name="ball", points=ball))
     assert any("complete model" in note for note in found.notes)
-    points = np.random.default_rng(0).normal(size=(10, 3))
-    with pytest.raises(InputError, match="few: a scan of 10 points"):
-        locate_sensor(RangeScan(name="few", points=points))
     line = np.linspace(0, 1, 100)[:, None] * np.array([1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match="one line"):
-        locate_sensor(RangeScan(name="line", points=line))
-    with pytest.raises(InputError, match="one line"):
-        locate_sensor(RangeScan(name="dot", points=np.ones((100, 3))))
+    for points, told in (
+        (rng.normal(size=(10, 3)), "it: a scan of 10 points"),
+        (line, "one line"),
+        (np.ones((100, 3)), "one line"),
+    ):
+        with pytest.raises(InputError, match=told):
+            locate_sensor(RangeScan(name="it", points=points))
 
 
 def test_flat_scan_is_seen_squarely_and_its_side_called_a_guess():
@@ -220,7 +205,7 @@ def test_flat_scan_is_seen_squarely_and_its_side_called_a_guess():
     scan = organised(image, pose := any_pose(2))
     for flat in (scan, replace(scan, grid=None)):
         found = locate_sensor(flat)
-        tilt = angle_deg(viewing(found), pose.rotation[:, 2])
+        tilt = angles_deg(viewing(found), pose.rotation[:, 2])
         assert min(tilt, 180 - tilt) < 2
         assert any("guess" in note for note in found.notes)
 
@@ -228,29 +213,21 @@ def test_flat_scan_is_seen_squarely_and_its_side_called_a_guess():
 def test_grid_that_does_not_fit_its_points_is_not_believed():
     scan = organised(render(PINHOLE), pose := any_pose(4))
     assert scan.grid is not None
-    grid = scan.grid.copy()
-    grid[grid >= 0] = np.random.default_rng(0).permutation(grid[grid >= 0])
-    found = locate_sensor(replace(scan, grid=grid))
-    assert found.viewpoint is Viewpoint.ESTIMATED and found.camera is None
-    assert angle_deg(viewing(found), pose.rotation[:, 2]) < 10
-    scan = replace(organised(render(PINHOLE), any_pose(8)), grid=None)
+    shuffled = scan.grid.copy()
+    shuffled[shuffled >= 0] = np.random.default_rng(0).permutation(shuffled[shuffled >= 0])
     row = np.arange(len(scan.points))[None]
-    for grid in (row, np.zeros((20, 20), dtype=int), np.full((20, 20), -1)):
-        assert locate_sensor(replace(scan, grid=grid)).viewpoint is Viewpoint.ESTIMATED
+    for grid in (shuffled, None, row, np.zeros((20, 20), dtype=int), np.full((20, 20), -1)):
+        found = locate_sensor(replace(scan, grid=grid))
+        assert found.viewpoint is Viewpoint.ESTIMATED and found.camera is None
+        assert angles_deg(viewing(found), pose.rotation[:, 2]) < 10
 
 
 def test_given_sensor_is_kept_and_one_without_a_camera_stands_well_before_the_object():
-    given_scan = replace(
-        organised(render(PINHOLE), Pose.identity()),
-        camera=PINHOLE,
-        scan_from_sensor=Pose.identity(),
-        viewpoint=Viewpoint.GIVEN,
-    )
+    scan = organised(render(PINHOLE), Pose.identity())
+    given_scan = replace(scan.with_sensor(Pose.identity(), Viewpoint.GIVEN), camera=PINHOLE)
     assert locate_sensor(given_scan) is given_scan
-    scan = replace(organised(render(PINHOLE), any_pose(6)), grid=None)
-    found = locate_sensor(scan)
-    assert found.scan_from_sensor is not None
-    distance = np.linalg.norm(found.scan_from_sensor.translation - scan.points.mean(axis=0))
+    found = locate_sensor(replace(scan, grid=None))
+    distance = np.linalg.norm(found.sensor_pose.translation - scan.points.mean(axis=0))
     assert distance == pytest.approx(2 * principal_diameter(scan.points))
 
 
@@ -263,7 +240,7 @@ def test_camera_without_a_pose_holds_only_where_the_points_fit_it(has_grid: bool
     assert np.array_equal(at_home.scan_from_sensor.matrix(), np.eye(4))
     pose = any_pose(9)
     away = locate_sensor(moved(scan, pose))
-    assert angle_deg(viewing(away), pose.rotation[:, 2]) < (1e-5 if has_grid else 10)
+    assert angles_deg(viewing(away), pose.rotation[:, 2]) < (1e-5 if has_grid else 10)
     assert (away.camera is not None) == has_grid
 
 

@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 
 from scanweld.config import PairsConfig
-from scanweld.evaluation.primitives import cylinder, lathe, sphere
+from scanweld.evaluation.primitives import cylinder, sphere
 from scanweld.evaluation.scanner import NoiseModel
-from scanweld.evaluation.views import view_of
 from scanweld.evidence.icp import MIN_MATCHES
 from scanweld.evidence.information import information_from, observability_of
 from scanweld.evidence.slippage import free_motions
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import Alternative, PairKind
 from scanweld.pairs.stability import PERTURBATION_DIAMETERS, is_stable
 from scanweld.pairs.verdict import result_of
-from tests.prepared import PreparedPair, creature_pair, pair_of_scene
-from tests.scenes import scene_of, small_creature
+from tests.bodies import lathed, seen_twice, vase
+from tests.prepared import PreparedPair, creature_pair
+from tests.scenes import small_creature
 from tests.view_graphs import seen
 
 CONFIG = PairsConfig()
@@ -106,28 +105,14 @@ def test_few_matches_hold_nothing():
     assert not is_stable(problem, BEST, np.zeros((6, 6)), none)
 
 
-NOISE = NoiseModel(depth_diameters=0.005)
+BODIES = {"creature": small_creature, "sphere": sphere, "cylinder": cylinder}
 
 
 @lru_cache
 def noisy_pair(body: str, gap: float) -> PreparedPair:
-    mesh = BODIES[body]
-    views = [
-        view_of(mesh, turn, 15.0, roll, pixels=140) for turn, roll in ((40, 0), (40 + gap, 70))
-    ]
-    return pair_of_scene(scene_of(mesh, views, noise=NOISE), 0, 1)
-
-
-def vase(turn: FloatArray, level: FloatArray) -> FloatArray:
-    return 26.0 + 10.0 * np.sin(8.2 * level + 0.3) + 0.0 * turn
-
-
-BODIES: dict[str, TriangleMesh] = {
-    "creature": small_creature(),
-    "sphere": sphere(),
-    "cylinder": cylinder(),
-    "vase": lathe(vase),
-}
+    mesh = BODIES[body]() if body in BODIES else lathed(vase)
+    noise = NoiseModel(depth_diameters=0.005)
+    return seen_twice(mesh, gap, 15.0, noise, azimuth_deg=40, rolls_deg=(0, 70), pixels=140)
 
 
 def pushed_back(pair: PreparedPair, information: FloatArray) -> bool:
@@ -136,15 +121,11 @@ def pushed_back(pair: PreparedPair, information: FloatArray) -> bool:
     return is_stable(problem, best, information, problem.matches(pair.i_from_j)[0])
 
 
-def information_at_truth(pair: PreparedPair) -> FloatArray:
-    return information_from([pair.problem().matches(pair.i_from_j)], pair.diameter)[0]
-
-
 @pytest.mark.parametrize("body", ["sphere", "cylinder", "vase"])
 @pytest.mark.parametrize("gap", [20.0, 50.0])
 def test_what_truly_slides_stays_where_it_is_pushed(body: str, gap: float):
     pair = noisy_pair(body, gap)
-    information = information_at_truth(pair)
+    information, *_ = information_from([pair.problem().matches(pair.i_from_j)], pair.diameter)
     assert len(free_motions(information, CONFIG.min_observability)) > 0
     assert not pushed_back(pair, information)
 

@@ -1,16 +1,20 @@
 """The table under an object: found and left out where there is one, and nothing else is."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import trimesh
 
 from scanweld.config import Config, PrepareConfig
+from scanweld.evaluation.primitives import box, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge.facts import Knowledge
-from scanweld.pipeline.intake import Intake, take_in
+from scanweld.pipeline.intake import take_in
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
 from scanweld.work.progress import NoCache, silent
@@ -25,9 +29,9 @@ def slab(mesh: TriangleMesh, width: float, thickness: float = 2.0) -> TriangleMe
     """A square slab of a width, in diameters of the mesh, under it."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     side = width * float(np.linalg.norm(high - low))
-    box = trimesh.creation.box((side, side, thickness))
+    block = trimesh.creation.box((side, side, thickness))
     place = np.array([*0.5 * (low + high)[:2], low[2] - 0.5 * thickness])
-    return TriangleMesh(vertices=box.vertices + place, faces=box.faces)
+    return TriangleMesh(vertices=block.vertices + place, faces=block.faces)
 
 
 def seen(mesh: TriangleMesh, azimuth_deg: float, elevation_deg: float = 30.0) -> RangeScan:
@@ -45,11 +49,6 @@ def solid(made: trimesh.Trimesh) -> TriangleMesh:
     return TriangleMesh(vertices=made.vertices, faces=made.faces)
 
 
-def taken_in(scans: list[RangeScan], config: Config | None = None) -> Intake:
-    stages = Stages(workers=1, cache=NoCache(), progress=silent)
-    return take_in(scans, {}, Knowledge(), config or Config(), stages)
-
-
 @pytest.mark.parametrize("azimuth_deg", [0.0, 130.0, 250.0])
 def test_what_is_left_out_is_the_table_and_nothing_else(azimuth_deg: float):
     mesh = small_creature()
@@ -65,6 +64,11 @@ def test_what_is_left_out_is_the_table_and_nothing_else(azimuth_deg: float):
     assert not left_out[height > 3.0 * spacing].any()
 
 
+def taken_in(scans: list[RangeScan], config: Config | None = None) -> Sequence[PreparedScan]:
+    stages = Stages(workers=1, cache=NoCache(), progress=silent)
+    return take_in(scans, {}, Knowledge(), config or Config(), stages).prepared
+
+
 def test_the_prepared_scan_shows_the_object_alone():
     alone = prepare(seen(small_creature(), 0.0), PrepareConfig())
     scan = prepare(seen(on_table(), 0.0), PrepareConfig(), without_support=True)
@@ -73,48 +77,36 @@ def test_the_prepared_scan_shows_the_object_alone():
     assert not stands_on_support(scan)
 
 
-@pytest.mark.parametrize(
-    "mesh",
-    [
-        small_creature(),
-        solid(trimesh.creation.box((60, 40, 30))),
-        solid(trimesh.creation.icosphere(subdivisions=4, radius=40)),
-        solid(trimesh.creation.cylinder(radius=30, height=60)),
-        joined(
-            solid(trimesh.creation.box((100, 70, 6))),
-            solid(trimesh.creation.cylinder(radius=12, height=14)),
-        ),
-    ],
-    ids=["figure", "box", "ball", "cylinder", "plate with a low boss"],
-)
-@pytest.mark.parametrize("azimuth_deg", [15.0, 200.0])
-def test_an_object_without_a_table_has_none(mesh: TriangleMesh, azimuth_deg: float):
-    assert not stands_on_support(prepare(seen(mesh, azimuth_deg), PrepareConfig()))
+BODIES = {
+    "figure": small_creature(),
+    "box": box(60, 40, 30),
+    "ball": sphere(40),
+    "cylinder": solid(trimesh.creation.cylinder(radius=30, height=60)),
+    "plate with a low boss": joined(
+        box(100, 70, 6), solid(trimesh.creation.cylinder(radius=12, height=14))
+    ),
+}
 
 
-def test_noise_and_a_line_of_points_are_no_table():
+@pytest.mark.parametrize("body", BODIES)
+def test_an_object_without_a_table_has_none(body: str):
+    for azimuth_deg in (15.0, 200.0):
+        assert not stands_on_support(prepare(seen(BODIES[body], azimuth_deg), PrepareConfig()))
     rng = np.random.default_rng(0)
     assert find_support(rng.normal(size=(3000, 3)), 0.05) is None
-    line = np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0])
-    assert find_support(line, 0.002) is None
+    assert find_support(np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), 0.002) is None
 
 
-def test_a_table_in_most_scans_is_left_out_of_these():
-    scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
-    scans.append(seen(small_creature(), 270.0))
-    prepared = taken_in(scans).prepared
-    without = {scan.name for scan in prepared if scan.is_without_support}
-    assert without == {"at 0", "at 90", "at 180"}
-    scans = [seen(small_creature(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
-    scans.append(seen(on_table(), 270.0))
-    assert not any(scan.is_without_support for scan in taken_in(scans).prepared)
-
-
-def test_the_table_is_kept_where_the_settings_say_so():
-    scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0)]
-    config = Config(prepare=PrepareConfig(support="kept"))
-    assert not any(scan.is_without_support for scan in taken_in(scans, config).prepared)
-    hashes = {
-        scan.work_hash for scan in (*taken_in(scans).prepared, *taken_in(scans, config).prepared)
+def test_a_table_in_most_scans_is_left_out_of_these_unless_the_settings_keep_it():
+    with_table = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0, 270.0)]
+    alone = [seen(small_creature(), azimuth) for azimuth in (0.0, 90.0, 180.0, 270.0)]
+    mostly = taken_in([*with_table[:3], alone[3]])
+    assert {scan.name: scan.is_without_support for scan in mostly} == {
+        **dict.fromkeys(["at 0", "at 90", "at 180"], True),
+        "at 270": False,
     }
-    assert len(hashes) == 4, "work on a scan with its table must not be taken for one without"
+    few = taken_in([*alone[:3], with_table[3]])
+    kept = taken_in(with_table[:3], Config(prepare=PrepareConfig(support="kept")))
+    assert not any(scan.is_without_support for scan in (*few, *kept))
+    hashes = {scan.work_hash for scan in (*mostly, *kept)}
+    assert len(hashes) == 7, "work on a scan with its table is none on one without"

@@ -125,6 +125,23 @@ def turned(pair: PairResult, degrees: float) -> PairResult:
     return replace(pair, alternatives=(wrong, *pair.alternatives[1:]))
 
 
+def graph_with(
+    pairs: Pairs,
+    *components: Component,
+    accepted: Pairs | None = None,
+    unplaced: Mapping[int, str] | None = None,
+) -> ViewGraph:
+    """A graph of pairs as found, of which some are accepted at their best pose."""
+    return ViewGraph(
+        pairs=pairs,
+        usable=pairs,
+        accepted={edge: pair.alternatives[0] for edge, pair in (accepted or {}).items()},
+        rejected={},
+        components=components,
+        unplaced=unplaced or {},
+    )
+
+
 def is_same(p: Pose, q: Pose) -> bool:
     apart = p.inverse() @ q
     return apart.angle_deg() < SAME_DEG and apart.shift_at(CENTRE) < SAME_SHIFT
