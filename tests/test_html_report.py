@@ -1,8 +1,10 @@
 """report.html: whole, by itself, the same every time, and true to the files beside it."""
 
+import base64
 import dataclasses
 import json
 import re
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,8 @@ from scanweld.app.html_report import write_html_report
 from scanweld.app.html_report.buffers import box_around, packed, quantised, steps
 from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
+from scanweld.app.html_report.orientation import as_seen_from
+from scanweld.app.html_report.scene import Scene, payload
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
 from scanweld.app.html_report.sources import Sources
 from scanweld.app.html_report.surface_check import check_surface, open_borders, thin_share
@@ -31,7 +35,7 @@ from scanweld.reconstruction import FactReport, FactVerdict, ScanVerdict
 from tests.command_line import scanweld as command
 from tests.html_pages import Page
 from tests.model_folders import Made, crowd, good_result, small_scene, whole_folder, written
-from tests.results import a_pair, a_result, no_pair
+from tests.results import a_mesh, a_pair, a_result, no_pair
 from tests.scenes import write_scans
 from tests.test_support import on_table, seen
 
@@ -347,3 +351,19 @@ def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def num_pictures(folder: Path) -> int:
     return len([tag for tag, _ in page_of(folder).elements if tag == "img"])
+
+
+def test_points_know_their_scan_beyond_the_256th():
+    numbers = np.arange(300)
+    scene = Scene(
+        mesh=a_mesh(),
+        borders=np.zeros((0, 2), np.int64),
+        points=np.zeros((300, 3)),
+        point_normals=np.zeros((300, 3)),
+        point_scan=numbers,
+    )
+    described, text = payload(scene, as_seen_from(None), ["#000000"] * 300)
+    place = described["arrays"]["pointScan"]
+    body = zlib.decompress(base64.b64decode(text))
+    found = np.frombuffer(body, "<u2", place["length"], place["offset"])
+    assert place["type"] == "uint16" and (found == numbers).all()
