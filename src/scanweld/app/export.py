@@ -13,7 +13,7 @@ from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import natural_key, path_from, read_scan, write_whole
+from scanweld.io import natural_key, path_from, write_whole
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
@@ -109,13 +109,9 @@ def _find_files(
 ) -> dict[str, Path]:
     """The scans' files, as far as they are needed."""
     formats = [FORMATS[name] for name in wanted.poses]
-    if not (_reads_scans(wanted) or any(form.needs_files for form in formats)):
-        return {}
-    return model.scan_files(names, scans)
-
-
-def _reads_scans(wanted: Wanted) -> bool:
-    return bool(wanted.points) or any(FORMATS[p].frame is Frame.SENSOR for p in wanted.poses)
+    if wanted.points or any(f.needs_files or f.frame is Frame.SENSOR for f in formats):
+        return model.scan_files(names, scans)
+    return {}
 
 
 def _render(
@@ -128,9 +124,8 @@ def _render(
     """All files by name, before any of them is written, and notes on them."""
     contents: dict[str, bytes] = {}
     notes: list[str] = []
-    scans: dict[str, RangeScan] = {}
-    if _reads_scans(wanted):
-        scans = {name: read_scan(path, name) for name, path in files.items()}
+    # Formats that only name the files are right for these very scans, too: all are checked.
+    scans = model.read_whole_scans(files)
     for name in dict.fromkeys(wanted.poses):
         sensors = scans if FORMATS[name].frame is Frame.SENSOR else {}
         posed = [_posed(key, pose, files, sensors, output) for key, pose in poses.items()]

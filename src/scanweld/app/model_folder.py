@@ -109,13 +109,33 @@ class ModelFolder:
             files: As ``scan_files`` finds them, by the scans' names.
 
         Raises:
+            InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        most = self._files.max_points
-        return {
-            name: read_scan(path, name) if most is None else thinned(read_scan(path, name), most)
-            for name, path in files.items()
-        }
+        return {name: self._as_taken(read_scan(path, name)) for name, path in files.items()}
+
+    def read_whole_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+        """The same with all of their points.
+
+        Raises:
+            InputError: If one of them is not what the model was made of.
+            ReadError: If one of them, or the report, is broken.
+        """
+        scans = {name: read_scan(path, name) for name, path in files.items()}
+        for scan in scans.values():
+            self._as_taken(scan)
+        return scans
+
+    def _as_taken(self, scan: RangeScan) -> RangeScan:
+        """A scan as the model's maker took it, after making sure that it is the same one."""
+        most, told = self._files.max_points, self._files.scans.get(scan.name)
+        taken = scan if most is None else thinned(scan, most)
+        if told is not None and told.content_hash not in (None, taken.content_hash()):
+            raise InputError(
+                f"{printed(scan.name)}: is not the scan that {self.path} was made of; give the "
+                "same files"
+            )
+        return taken
 
     @cached_property
     def _files(self) -> Files:
