@@ -87,7 +87,6 @@ Memory = Annotated[
     str | None,
     typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
 ]
-Seed = Annotated[int | None, typer.Option(min=0, help="Seed of everything random.")]
 WithDoubtful = Annotated[
     bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
 ]
@@ -124,7 +123,6 @@ def run(
     config: ConfigFile = None,
     workers: Workers = None,
     memory: Memory = None,
-    seed: Seed = None,
     unit: UnitOption = None,
     method: MethodOption = None,
     knowledge: Known = None,
@@ -147,7 +145,6 @@ def run(
     """Register and fuse scans: poses, a model and a verdict."""
     settings = load_config(
         config,
-        seed=seed,
         unit=None if unit is None else unit.value,
         method=None if method is None else method.value,
         fusion={
