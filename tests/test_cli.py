@@ -1,11 +1,13 @@
 """The command line as users meet it: exit codes, streams, and what is left on disk."""
 
+import inspect
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ import pytest
 
 from scanweld.app import job
 from scanweld.app.cli import main
+from scanweld.app.options import takes
 from scanweld.app.workspace import work_folder
 from scanweld.errors import InputError
 from scanweld.evaluation.scanner import scan_mesh
@@ -356,3 +359,32 @@ def test_the_package_runs_as_a_module_and_leaves_with_its_exit_code():
     assert done.returncode == 1
     assert done.stdout == ""
     assert done.stderr == "scanweld: error: nowhere: there is no such file; check the path\n"
+
+
+def test_a_command_of_a_record_has_the_fields_as_options():
+    @dataclass(frozen=True, kw_only=True)
+    class Inner:
+        small: bool = False
+
+    @dataclass(frozen=True, kw_only=True)
+    class Outer:
+        name: str
+        inner: Inner
+        words: list[str] = field(default_factory=list)
+
+    found: list[Outer] = []
+
+    @takes(Outer)
+    def command(options: Outer) -> None:
+        """What it does."""
+        found.append(options)
+
+    parameters = inspect.signature(command).parameters
+    assert [(each.name, each.default) for each in parameters.values()] == [
+        ("name", inspect.Parameter.empty),
+        ("small", False),
+        ("words", []),
+    ]
+    assert command.__doc__ == "What it does."
+    command(name="a", small=True, words=["b"])
+    assert found == [Outer(name="a", inner=Inner(small=True), words=["b"])]
