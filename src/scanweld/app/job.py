@@ -87,7 +87,7 @@ def run_job(
         places = relative_paths(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
         with telling(progress, "report"):
-            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
