@@ -13,18 +13,18 @@ from typing import Annotated, Literal
 
 import typer
 
-from scanweld.app.comparison import compare, comparison_table
-from scanweld.app.info import describe_scan
 from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
 from scanweld.app.options import NOT_GOOD
 from scanweld.errors import BudgetError, KnowledgeError, ScanweldError
+from scanweld.evaluation.comparison import compare, comparison_table
 from scanweld.evaluation.metrics import Standing
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.simulate import TYPICAL_NOISE
 from scanweld.evaluation.simulate import simulate as make_scans
 from scanweld.geometry.camera import CameraModel
 from scanweld.io import collect, read_mesh, read_scan
+from scanweld.preparation.info import describe_scan
 
 ERROR = 1
 USAGE = 2
