@@ -14,6 +14,7 @@ from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import write_whole
 from scanweld.reconstruction import Reconstruction
+from scanweld.work.threads import single_threaded_algebra
 
 logger = logging.getLogger(__name__)
 
@@ -45,7 +46,8 @@ def write_html_report(
     sources = None
     if scans is not None and model.poses.poses:
         sources = Sources(model, scans, config.prepare)
-    page = report_page(model, sources, config)
+    with single_threaded_algebra():
+        page = report_page(model, sources, config)
     path = folder / "report.html"
     write_whole(path, page.encode("utf-8"))
     logger.debug("%s: %d bytes", path, len(page))
