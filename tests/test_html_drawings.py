@@ -3,12 +3,15 @@
 import dataclasses
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from scanweld.app.html_report import numbers
 from scanweld.app.html_report.colors import scan_colors
 from scanweld.app.html_report.page import scan_looks
 from scanweld.app.html_report.view_graph import draw_graph, round_order
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.shading import seen_from
 from tests.results import a_pair
 
 
@@ -57,3 +60,28 @@ def test_the_drawing_has_every_scan_once():
 )
 def test_numbers_as_people_read_them(told: str, wanted: str):
     assert told == wanted
+
+
+def test_a_side_shades_every_colour_by_the_angle_to_the_viewer():
+    square = TriangleMesh(
+        vertices=np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]),
+        faces=np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+    red = np.full((4, 3), (200, 0, 0), np.uint8)
+    up = (0.0, 1.0, 0.0)
+    facing = seen_from(square, (0, 0, 1), up, 40)
+    assert (facing.shaded(red)[20, 20] == (200, 0, 0)).all()
+    assert (facing.shaded()[20, 20] == (205, 205, 200)).all()  # grey without colours
+    assert (facing.cutout(red)[20, 20] == (200, 0, 0, 255)).all()
+    assert (facing.cutout(red)[0, 0] == 0).all() and (facing.shaded(red)[0, 0] == 255).all()
+    oblique = seen_from(square, (np.sqrt(3), 0, 1), up, 40).shaded(red)  # 60 degrees aside
+    row = oblique[20][(oblique[20] != 255).any(axis=1)]
+    assert (row[len(row) // 2] == (round(200 * (0.15 + 0.85 * 0.5)), 0, 0)).all()
+    behind = seen_from(square, (0, 0, -1), up, 40).shaded(red)
+    assert (behind[20, 20] == (120, 140, 190)).all()
+    lit = dataclasses.replace(square, normals=np.full((4, 3), (0.0, 0.6, 0.8)))
+    assert seen_from(lit, (0, 0, 1), up, 40).shaded(red)[20, 20, 0] == round(200 * 0.83)
+    assert seen_from(lit, (0, 0, 1), up, 40, smooth=False).shaded(red)[20, 20, 0] == 200
+    mixed = facing.shaded(np.array([[0, 0, 0], [200, 0, 0], [200, 0, 0], [0, 0, 0]], np.uint8))
+    reds = mixed[20, 3:37, 0].astype(int)
+    assert (np.diff(reds) > 0).all() and abs(reds[17] - 100) < 6  # from black to red

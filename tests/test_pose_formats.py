@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanweld.app.model_commands import PoseFormatName
+from scanweld.app.export import PoseFormat
 from scanweld.errors import InputError, ReadError, ScanweldError, WriteError
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
@@ -330,3 +330,7 @@ def test_broken_files_are_one_line_that_names_them(tmp_path: Path, name: str):
         assert "unknown format of poses" in told
         known = ("conf", "mlp", "aln", "TUM", "COLMAP", "Open3D", "CloudCompare", "nerfstudio")
         assert all(word in told for word in known)
+
+
+def test_the_command_offers_every_format():
+    assert [form.value for form in PoseFormat] == list(FORMATS)

@@ -239,7 +239,9 @@ def test_scans_in_one_unit_are_not_blamed():
     assert all(0 < estimate.deviation < 0.005 for estimate in found.values())
     scans, poses = placed(1.0)
     apart = {k: Pose.exp([0, 0, 0, 1e4 * k, 0, 0]) @ pose for k, pose in poses.items()}
-    assert estimate_scales(scans, apart, list(combinations(apart, 2))) == {}, "scans that touch nothing have no scale"
+    assert estimate_scales(scans, apart, list(combinations(apart, 2))) == {}, (
+        "scans that touch nothing have no scale"
+    )
 
 
 def test_the_unit_of_all_does_not_matter():

@@ -14,10 +14,11 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge.facts import Knowledge
+from scanweld.pipeline import intake
 from scanweld.pipeline.intake import take_in
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
-from scanweld.work.progress import NoCache, silent
+from scanweld.work.progress import Event, NoCache, StageAdvanced, silent
 from scanweld.work.stage_log import Stages
 from tests.meshes import joined
 from tests.scenes import small_creature
@@ -95,6 +96,26 @@ def test_an_object_without_a_table_has_none(body: str):
     rng = np.random.default_rng(0)
     assert find_support(rng.normal(size=(3000, 3)), 0.05) is None
     assert find_support(np.outer(np.linspace(0, 1, 500), [1.0, 2.0, 3.0]), 0.002) is None
+
+
+def test_only_scans_on_the_table_are_prepared_again_and_progress_counts_each_once(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
+    scans.append(seen(small_creature(), 270.0))
+    worked: list[str] = []
+
+    def counted(scan: RangeScan, config: PrepareConfig, **options: bool) -> PreparedScan:
+        worked.append(scan.name)
+        return prepare(scan, config, **options)
+
+    monkeypatch.setattr(intake, "prepare", counted)
+    events: list[Event] = []
+    stages = Stages(workers=1, cache=NoCache(), progress=events.append)
+    take_in(scans, {}, Knowledge(), Config(), stages)
+    assert worked == ["at 0", "at 180", "at 270", "at 90", "at 0", "at 180", "at 90"]
+    done = [event.done for event in events if isinstance(event, StageAdvanced)]
+    assert done == [1, 2, 3, 4]
 
 
 def test_a_table_in_most_scans_is_left_out_of_these_unless_the_settings_keep_it():

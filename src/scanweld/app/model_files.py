@@ -10,7 +10,7 @@ from scanweld.errors import ReadError
 from scanweld.evidence.evidence import Evidence
 from scanweld.io.poses import load_json, read_text
 from scanweld.pairs.result import PairKind
-from scanweld.reconstruction import FactReport, ScanVerdict, Verdict
+from scanweld.reconstruction import FactReport, ScanReport, Verdict
 
 
 class Entry(BaseModel):
@@ -20,9 +20,10 @@ class Entry(BaseModel):
 
 
 class FileEntry(Entry):
-    """Where a scan's file is, as seen from the folder."""
+    """Where a scan's file is, as seen from the folder, and the hash of the scan's content."""
 
     file: str | None = None
+    content_hash: str | None = None
 
 
 class Files(Entry):
@@ -30,27 +31,6 @@ class Files(Entry):
 
     scans: dict[str, FileEntry]
     max_points: int | None = None
-
-
-class ScanEntry(Entry):
-    """A scan in report.json."""
-
-    verdict: ScanVerdict
-    reason: str
-    num_points: int
-    num_dropped: int
-    resolution: float | None
-    diameter: float | None
-    camera: str | None
-    viewpoint: str
-    notes: tuple[str, ...]
-    content_hash: str | None
-    num_keypoints: int
-    edges: tuple[str, ...]
-    overlap: float | None
-    rms: float | None
-    is_without_support: bool = False
-    confidence: float | None = None
 
 
 class StageEntry(Entry):
@@ -73,7 +53,7 @@ class Report(Entry):
     verdict: Verdict
     reasons: tuple[str, ...]
     knowledge: tuple[FactReport, ...] = ()
-    scans: dict[str, ScanEntry]
+    scans: dict[str, ScanReport]
     stages: dict[str, StageEntry]
     settings: dict[str, Any]
 

@@ -3,12 +3,14 @@
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
-from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
+from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose, nearest_rotation
@@ -26,6 +28,124 @@ _OVERSAMPLING = 2
 """Pixels rendered along the edge of each pixel of the picture, against jagged outlines."""
 
 
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Side:
+    """A mesh under a headlight, seen from one side: rendered once, and then in any colours.
+
+    Attributes:
+        faces: (F, 3) of the mesh.
+        pixels: (V, 2) places of its vertices in an image of twice the picture's size.
+        face_of: (H, W) face that is seen in each pixel of that image, -1 where none is.
+        light: (V,) of the vertices, or (F,) of the faces if these are flat: cosine between the
+            normal and the direction to the viewer.
+        is_smooth: Which of the two.
+    """
+
+    faces: IntArray
+    pixels: FloatArray
+    face_of: IntArray
+    light: FloatArray
+    is_smooth: bool
+
+    def shaded(self, colors: ByteArray | None = None) -> ByteArray:
+        """(H, W, 3) picture on white, of vertices in colours (V, 3), grey if not given."""
+        total, cover = self._sums(colors)
+        white = 255.0 * (_OVERSAMPLING**2 - cover[..., None])
+        return np.rint((total + white) / _OVERSAMPLING**2).astype(np.uint8)
+
+    def cutout(self, colors: ByteArray | None = None) -> ByteArray:
+        """The same as (H, W, 4) with the background transparent."""
+        total, cover = self._sums(colors)
+        color = total / np.maximum(cover, 1)[..., None]
+        alpha = 255.0 * cover[..., None] / _OVERSAMPLING**2
+        return np.rint(np.concatenate([color, alpha], axis=2)).astype(np.uint8)
+
+    def _sums(self, colors: ByteArray | None) -> tuple[FloatArray, IntArray]:
+        """Sum of the colours (H, W, 3) that are seen in each pixel, and their number (H, W)."""
+        height, width = (size // _OVERSAMPLING for size in self.face_of.shape)
+        total, cover = np.zeros((height, width, 3)), np.zeros((height, width), np.int64)
+        shown = np.zeros((0, 3), np.uint8) if colors is None else np.array(colors, order="C")
+        faces = np.array(self.faces, order="C")  # writable: the kernel is compiled for one kind
+        seen = (self.pixels, self.face_of, self.light, self.is_smooth)
+        _shade(faces, *seen, shown, _FRONT, _BACK, total, cover)
+        return total, cover
+
+
+def seen_from(
+    mesh: TriangleMesh,
+    direction: ArrayLike,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+    size: int = 600,
+    *,
+    smooth: bool = True,
+) -> Side:
+    """A mesh seen orthographically and filling the picture; faces seen from behind are blue.
+
+    Args:
+        mesh: With at least one face.
+        direction: (3,) from the object to the viewer, of any length.
+        up: (3,) what is up in the picture; must not be parallel to the direction.
+        size: Pixels along the longer side of the picture.
+        smooth: Shade by the vertices' normals, where there are any, rather than by the faces'.
+    """
+    picture_from_world = looking_from(np.asarray(direction, float), np.asarray(up, float))
+    points = picture_from_world.apply(mesh.vertices)
+    is_used = np.zeros(len(points), bool)
+    is_used[mesh.faces.ravel()] = True
+    camera = _camera_around(points[is_used], size * _OVERSAMPLING)
+    if smooth and mesh.normals is not None:
+        light = mesh.normals @ picture_from_world.rotation[2]
+    else:
+        flat = face_normals(points, mesh.faces)
+        light = flat[:, 2] / np.maximum(np.linalg.norm(flat, axis=1), np.finfo(float).tiny)
+    return Side(
+        faces=mesh.faces,
+        pixels=camera.project(points)[0],
+        face_of=render_depth(points, mesh.faces, camera)[1],
+        light=light,
+        is_smooth=smooth and mesh.normals is not None,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _shade(
+    faces: IntArray,
+    pixels: FloatArray,
+    face_of: IntArray,
+    light: FloatArray,
+    is_smooth: bool,
+    colors: ByteArray,
+    front: FloatArray,
+    back: FloatArray,
+    total: FloatArray,
+    cover: IntArray,
+) -> None:
+    """Add up the shaded colours of the small pixels of each pixel, and count these."""
+    for v in range(_OVERSAMPLING * total.shape[0]):
+        for u in range(_OVERSAMPLING * total.shape[1]):
+            f = face_of[v, u]
+            if f < 0:
+                continue
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay = pixels[a, 0] - u, pixels[a, 1] - v
+            bx, by = pixels[b, 0] - u, pixels[b, 1] - v
+            cx, cy = pixels[c, 0] - u, pixels[c, 1] - v
+            wa, wb, wc = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+            area = wa + wb + wc  # not 0: the face is seen
+            wa, wb, wc = wa / area, wb / area, wc / area
+            cosine = wa * light[a] + wb * light[b] + wc * light[c] if is_smooth else light[f]
+            bright = _AMBIENT + (1.0 - _AMBIENT) * min(abs(cosine), 1.0)
+            row, column = v // _OVERSAMPLING, u // _OVERSAMPLING
+            cover[row, column] += 1
+            for k in range(3):
+                color = front[k]
+                if area > 0:
+                    color = back[k]
+                elif len(colors):
+                    color = wa * colors[a, k] + wb * colors[b, k] + wc * colors[c, k]
+                total[row, column, k] += color * bright
+
+
 def render_shaded(
     mesh: TriangleMesh,
     direction: ArrayLike,
@@ -34,64 +154,8 @@ def render_shaded(
     *,
     smooth: bool = True,
 ) -> ByteArray:
-    """A mesh under a headlight, seen orthographically and filling the picture.
-
-    Colours are the mesh's own, else grey; faces seen from behind are blue.
-
-    Args:
-        mesh: With at least one face.
-        direction: (3,) from the object to the viewer, of any length.
-        up: (3,) what is up in the picture; must not be parallel to the direction.
-        size: Pixels along the longer side of the picture.
-        smooth: Shade by the vertices' normals, where there are any, rather than by the faces'.
-
-    Returns:
-        (H, W, 3) picture on white.
-    """
-    picture, _ = _render(mesh, direction, up, size, smooth)
-    return np.rint(_shrunk(picture)).astype(np.uint8)
-
-
-def render_cutout(
-    mesh: TriangleMesh,
-    direction: ArrayLike,
-    up: ArrayLike = (0.0, 0.0, 1.0),
-    size: int = 600,
-    *,
-    smooth: bool = True,
-) -> ByteArray:
-    """Like ``render_shaded``, but (H, W, 4) with the background transparent."""
-    picture, seen = _render(mesh, direction, up, size, smooth)
-    picture[~seen] = 0.0
-    cover = _shrunk(seen[..., None].astype(np.float64))
-    color = np.divide(_shrunk(picture), cover, out=np.zeros((*cover.shape[:2], 3)), where=cover > 0)
-    return np.rint(np.concatenate([color, 255.0 * cover], axis=2)).astype(np.uint8)
-
-
-def _render(
-    mesh: TriangleMesh, direction: ArrayLike, up: ArrayLike, size: int, smooth: bool
-) -> tuple[FloatArray, BoolArray]:
-    """The picture (H, W, 3) at twice the size, and which of its pixels (H, W) show the mesh."""
-    picture_from_world = looking_from(np.asarray(direction, float), np.asarray(up, float))
-    points = picture_from_world.apply(mesh.vertices)
-    camera = _camera_around(points[np.unique(mesh.faces)], size * _OVERSAMPLING)
-    depth, face_of = render_depth(points, mesh.faces, camera)
-    seen = face_of >= 0
-    picture = np.full((*depth.shape, 3), 255.0)
-    faces = mesh.faces[face_of[seen]]
-    shares = barycentric(points[faces], camera.unproject_image(depth)[seen])
-    flat = face_normals(points, faces)
-    facing = flat[:, 2] / np.maximum(np.linalg.norm(flat, axis=1), np.finfo(float).tiny)
-    light = np.abs(facing)
-    if smooth and mesh.normals is not None:
-        turned = picture_from_world.turn(mesh.normals)
-        light = np.abs(np.einsum("nk,nk->n", shares, turned[faces][..., 2]))
-    color = np.broadcast_to(_FRONT, (len(faces), 3))
-    if mesh.colors is not None:
-        color = np.einsum("nk,nkc->nc", shares, mesh.colors[faces].astype(float))
-    color = np.where((facing > 0)[:, None], _BACK, color)
-    picture[seen] = color * (_AMBIENT + (1 - _AMBIENT) * np.minimum(light, 1.0))[:, None]
-    return picture, seen
+    """A mesh in its own colours as (H, W, 3) picture on white; see ``seen_from``."""
+    return seen_from(mesh, direction, up, size, smooth=smooth).shaded(mesh.colors)
 
 
 def side_by_side(pictures: Sequence[ByteArray]) -> ByteArray:
@@ -114,7 +178,7 @@ def png_bytes(picture: ByteArray) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
     rows = np.zeros((height, 1 + channels * width), np.uint8)
     rows[:, 1:] = picture.reshape(height, -1)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks)
 
 
@@ -157,10 +221,3 @@ def barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
     area = cross(b - a, c - a)
     shares = np.stack([cross(b - p, c - p), cross(c - p, a - p), cross(a - p, b - p)], axis=1)
     return shares / np.where(area != 0, area, 1.0)[:, None]
-
-
-def _shrunk(picture: FloatArray) -> ByteArray:
-    k = _OVERSAMPLING
-    height, width = picture.shape[0] // k, picture.shape[1] // k
-    cells = picture[: k * height, : k * width].reshape(height, k, width, k, -1)
-    return cells.mean(axis=(1, 3))

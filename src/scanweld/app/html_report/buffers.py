@@ -15,6 +15,8 @@ LARGEST = 65535
 """Of a coordinate, after quantising."""
 TYPES: Mapping[str, str] = {"uint8": "u1", "int8": "i1", "uint16": "<u2", "int32": "<i4"}
 """Types of the arrays, by numpy's name."""
+LEVEL = 4
+"""Of deflate: 9 takes ten times as long for 2 % less."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,4 +65,4 @@ def packed(arrays: Mapping[str, NDArray]) -> tuple[dict[str, Any], str]:
         padding = -len(body) % 4  # typed arrays begin at multiples of their size
         parts += [body, bytes(padding)]
         offset += len(body) + padding
-    return index, base64.b64encode(zlib.compress(b"".join(parts), 9)).decode("ascii")
+    return index, base64.b64encode(zlib.compress(b"".join(parts), LEVEL)).decode("ascii")

@@ -18,10 +18,10 @@ from scanweld.app.html_report.colors import (
 from scanweld.app.html_report.contour_overlays import Overlay, contour_overlays
 from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
-from scanweld.app.html_report.orientation import Orientation, as_seen_from
+from scanweld.app.html_report.orientation import as_seen_from
 from scanweld.app.html_report.scene import Scene, make_scene, payload
 from scanweld.app.html_report.sources import Sources
-from scanweld.app.html_report.stills import painted_sides, three_sides
+from scanweld.app.html_report.stills import AROUND, FACES, sides_of, stills
 from scanweld.app.html_report.surface_check import (
     SurfaceCheck,
     check_surface,
@@ -33,6 +33,7 @@ from scanweld.app.model_files import PairEntry
 from scanweld.app.model_folder import ModelFolder
 from scanweld.app.summary import verdict_sentence
 from scanweld.config import Config
+from scanweld.geometry.shading import Side
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanVerdict
 
@@ -204,6 +205,7 @@ def _surface(
     borders = open_borders(mesh)
     scene = make_scene(mesh, borders, check)
     shown = [] if check is None else list(check.points)
+    sides = sides_of(scene.mesh, orientation)
     described, buffers = payload(scene, orientation, [looks[name].color for name in shown])
     return {
         "model": {
@@ -211,18 +213,18 @@ def _surface(
             "faces": len(mesh.faces),
             "num_scans": len(model.fused_scans),
             "shown_faces": len(scene.mesh.faces),
-            "sides": three_sides(scene.mesh, orientation),
+            "sides": stills(sides, AROUND, scene.mesh.colors, "The model from"),
             "borders": borders,
             "scene": described,
             "buffers": buffers,
             "shown_scans": shown,
         },
-        "check": None if check is None else _measured(model, check, scene, orientation),
+        "check": None if check is None else _measured(model, check, scene, sides),
     }
 
 
 def _measured(
-    model: ModelFolder, check: SurfaceCheck, scene: Scene, orientation: Orientation
+    model: ModelFolder, check: SurfaceCheck, scene: Scene, sides: Mapping[str, Side]
 ) -> dict[str, Any] | None:
     """Residuals and support in numbers and pictures; None where the scans miss the model."""
     found = histogram(check.all_distances())
@@ -238,10 +240,8 @@ def _measured(
         "residual_end": scene.residual_end,
         "residual_stops": RESIDUAL_STOPS,
         "support_stops": SUPPORT_STOPS,
-        "heat": painted_sides(scene.mesh, residual, orientation, "The model coloured by residual")[
-            :2
-        ],
-        "support": painted_sides(scene.mesh, support, orientation, "The model coloured by support"),
+        "heat": stills(sides, FACES[:2], residual, "The model coloured by residual, seen from"),
+        "support": stills(sides, FACES, support, "The model coloured by support, seen from"),
     }
 
 

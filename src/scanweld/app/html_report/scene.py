@@ -98,7 +98,7 @@ def make_scene(mesh: TriangleMesh, borders: OpenBorders, check: SurfaceCheck | N
     known = residual[np.isfinite(residual)]
     end = float(np.quantile(known, RESIDUAL_QUANTILE)) if len(known) else 0.0
     support = np.rint(cluster_means(cluster, check.support[:, None].astype(float))[:, 0])
-    points, normals, number = _thinned(check, vertex_normals(mesh.vertices, mesh.faces))
+    points, normals, number = _thinned(check)
     return Scene(
         mesh=shown,
         borders=edges,
@@ -111,7 +111,7 @@ def make_scene(mesh: TriangleMesh, borders: OpenBorders, check: SurfaceCheck | N
     )
 
 
-def _thinned(check: SurfaceCheck, normals: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+def _thinned(check: SurfaceCheck) -> tuple[FloatArray, FloatArray, IntArray]:
     """Points of all scans, the model's normals there, and the scans' numbers."""
     total = sum(map(len, check.points.values()))
     rng = np.random.default_rng(0)  # evenly strided points of a grid would show its columns
@@ -120,7 +120,7 @@ def _thinned(check: SurfaceCheck, normals: FloatArray) -> tuple[FloatArray, Floa
         wanted = len(all_points) * min(total, MAX_POINTS) // max(total, 1)
         chosen = np.sort(rng.permutation(len(all_points))[:wanted])
         points.append(all_points[chosen])
-        directions_.append(normals[check.nearest[name][chosen]])
+        directions_.append(check.normals[check.nearest[name][chosen]])
         numbers.append(np.full(wanted, k))
     return np.concatenate(points), np.concatenate(directions_), np.concatenate(numbers)
 
@@ -151,7 +151,7 @@ def payload(
     if scene.points is not None and scene.point_normals is not None:
         arrays["pointPosition"] = quantised(scene.points, box)
         arrays["pointNormal"] = directions(scene.point_normals)
-        arrays["pointScan"] = np.asarray(scene.point_scan).astype(np.uint8)
+        arrays["pointScan"] = np.asarray(scene.point_scan).astype(np.uint16)
     index, text = packed(arrays)
     description = {
         "arrays": index,

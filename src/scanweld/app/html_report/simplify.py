@@ -41,5 +41,8 @@ def cluster_faces(cluster: IntArray, faces: IntArray) -> IntArray:
     mapped = cluster[faces]
     a, b, c = mapped.T
     whole = mapped[(a != b) & (b != c) & (c != a)]
-    _, first = np.unique(np.sort(whole, axis=1), axis=0, return_index=True)
+    size = int(cluster.max(initial=0)) + 1
+    low, high = whole.min(axis=1), whole.max(axis=1)
+    key = (low * size + (whole.sum(axis=1) - low - high)) * size + high
+    _, first = np.unique(key, return_index=True)
     return whole[np.sort(first)]

@@ -1,17 +1,19 @@
 """Pictures of the model that need no script."""
 
 import base64
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from scanweld.app.html_report.orientation import Orientation
-from scanweld.geometry.arrays import ByteArray, FloatArray
+from scanweld.geometry.arrays import ByteArray
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.geometry.shading import png_bytes, render_cutout
+from scanweld.geometry.shading import Side, png_bytes, seen_from
 
 PIXELS = 440
 """Longer side of a picture."""
-SIDES = (("front", 0.0), ("right", 120.0), ("left", 240.0))
-"""What the three sides are called, and how far around the object they are, in degrees."""
+AROUND = ("the front", "the right", "the left")
+FACES = ("the front", "behind", "below")
+"""Sides from which the model is shown, the first three a third of a turn apart."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -24,28 +26,27 @@ class Still:
     height: int
 
 
-def three_sides(mesh: TriangleMesh, orientation: Orientation) -> list[Still]:
-    """The model from the reference scan's side, and from a third of a turn to either side."""
-    return [
-        _still(mesh, orientation.turned(degrees), orientation.up, f"The model from the {name}")
-        for name, degrees in SIDES
-    ]
-
-
-def painted_sides(
-    mesh: TriangleMesh, colors: ByteArray, orientation: Orientation, what: str
-) -> list[Still]:
-    """The model in colours (V, 3) that mean something, from the front, behind and below."""
-    painted = replace(mesh, colors=colors)
+def sides_of(mesh: TriangleMesh, orientation: Orientation) -> dict[str, Side]:
+    """The model from all sides, as the reference scan's sensor is the front."""
     front, up = orientation.front, orientation.up
-    views = (("the front", front, up), ("behind", -front, up), ("below", -up, front))
-    return [
-        _still(painted, direction, upright, f"{what}, seen from {side}")
-        for side, direction, upright in views
-    ]
+    views = {
+        "the front": (front, up),
+        "the right": (orientation.turned(120.0), up),
+        "the left": (orientation.turned(240.0), up),
+        "behind": (-front, up),
+        "below": (-up, front),
+    }
+    return {name: seen_from(mesh, *view, PIXELS) for name, view in views.items()}
 
 
-def _still(mesh: TriangleMesh, direction: FloatArray, up: FloatArray, alt: str) -> Still:
-    picture = render_cutout(mesh, direction, up, PIXELS)
+def stills(
+    sides: Mapping[str, Side], names: Sequence[str], colors: ByteArray | None, what: str
+) -> list[Still]:
+    """Pictures from some of the sides, in colours (V, 3)."""
+    return [_still(sides[name], colors, f"{what} {name}") for name in names]
+
+
+def _still(side: Side, colors: ByteArray | None, alt: str) -> Still:
+    picture = side.cutout(colors)
     address = "data:image/png;base64," + base64.b64encode(png_bytes(picture)).decode("ascii")
     return Still(address=address, alt=alt, width=picture.shape[1], height=picture.shape[0])

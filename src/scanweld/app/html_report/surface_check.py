@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals, vertex_normals
 
-MAX_POINTS = 1_000_000
+MAX_POINTS = 300_000
 """Points of all scans together that are held against the surface; beyond, every k-th is."""
 REACH_EDGES = 6.0
 """A point farther from all vertices than so many median edges is off the model."""
@@ -30,6 +30,7 @@ class SurfaceCheck:
             outside, in the scans' unit; points off the model left out.
         points: For each scan the points (N, 3) of these distances, in the model's frame,
         nearest: and the vertex (N,) nearest to each.
+        normals: (V, 3) of the model.
         off_model: Share of all points that lie farther than the reach from the model.
         residual: (V,) mean distance of the points at each vertex, smoothed; NaN without any.
         support: (V,) number of scans whose surface lies there, as the model says; where it does
@@ -39,6 +40,7 @@ class SurfaceCheck:
     distances: Mapping[str, FloatArray]
     points: Mapping[str, FloatArray]
     nearest: Mapping[str, IntArray]
+    normals: FloatArray
     off_model: float
     residual: FloatArray
     support: IntArray
@@ -76,7 +78,7 @@ def check_surface(mesh: TriangleMesh, scans: Mapping[str, FloatArray]) -> Surfac
     reach = REACH_EDGES * median_edge(mesh)
     total = sum(len(points) for points in scans.values())
     step = max(1, -(-total // MAX_POINTS))
-    tree = KDTree(mesh.vertices)
+    tree = KDTree(mesh.vertices, compact_nodes=False, balanced_tree=False)  # soon built
     distances, kept, vertices = {}, {}, {}
     num_used = num_checked = 0
     size = len(mesh.vertices)
@@ -89,14 +91,16 @@ def check_surface(mesh: TriangleMesh, scans: Mapping[str, FloatArray]) -> Surfac
         signed = np.einsum("nk,nk->n", normals[nearest], points - mesh.vertices[nearest])
         distances[name], kept[name], vertices[name] = signed, points, nearest
         num_checked, num_used = num_checked + len(near), num_used + len(points)
-        seen = np.bincount(nearest, minlength=size) > 0
-        support += spread(seen, mesh.faces, rounds=int(np.ceil(np.sqrt(step))))
+        number = np.bincount(nearest, minlength=size)
+        if mesh.support is None:
+            support += spread(number > 0, mesh.faces, rounds=int(np.ceil(np.sqrt(step))))
         sums += np.bincount(nearest, weights=np.abs(signed), minlength=size)
-        counts += np.bincount(nearest, minlength=size)
+        counts += number
     return SurfaceCheck(
         distances=distances,
         points=kept,
         nearest=vertices,
+        normals=normals,
         off_model=1 - num_used / num_checked if num_checked else 0.0,
         residual=_smoothed(sums, counts, mesh.faces),
         support=support if mesh.support is None else mesh.support,
@@ -106,7 +110,7 @@ def check_surface(mesh: TriangleMesh, scans: Mapping[str, FloatArray]) -> Surfac
 def thin_share(mesh: TriangleMesh, support: IntArray) -> float:
     """Share of the surface's area that is thinly supported."""
     areas = np.linalg.norm(face_normals(mesh.vertices, mesh.faces), axis=1)
-    thin = np.median(support[mesh.faces], axis=1) <= THIN
+    thin = (support <= THIN)[mesh.faces].sum(axis=1) >= 2  # the median of three
     return float(areas[thin].sum() / areas.sum()) if areas.sum() > 0 else 0.0
 
 
@@ -132,8 +136,9 @@ def open_borders(mesh: TriangleMesh) -> OpenBorders:
 
 def median_edge(mesh: TriangleMesh) -> float:
     """Median length of the faces' edges."""
-    corners = mesh.vertices[mesh.faces]
-    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+    a, b, c = (mesh.vertices[corner] for corner in mesh.faces.T)
+    squares = [np.einsum("nk,nk->n", side, side) for side in (a - b, b - c, c - a)]
+    return float(np.median(np.sqrt(np.concatenate(squares))))
 
 
 def spread(seen: BoolArray, faces: IntArray, rounds: int) -> BoolArray:
