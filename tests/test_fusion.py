@@ -60,7 +60,7 @@ def test_same_bytes_whatever_the_blocks_at_a_time(monkeypatch: pytest.MonkeyPatc
     expected = fuse(*sphere_scans(), CONFIG)
     for chunk in (None, 1):
         if chunk is not None:
-            monkeypatch.setattr("scanweld.fusion.surface.CHUNK", chunk)
+            monkeypatch.setattr("scanweld.fusion.integrate.CHUNK", chunk)
         mesh = fuse(*sphere_scans(), CONFIG)
         assert mesh.vertices.tobytes() == expected.vertices.tobytes()
         assert mesh.faces.tobytes() == expected.faces.tobytes()

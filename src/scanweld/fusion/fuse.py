@@ -18,11 +18,12 @@ from scanweld.fusion.finish import (
     split_fans,
 )
 from scanweld.fusion.holes import closed_field
+from scanweld.fusion.integrate import integrate
 from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
 from scanweld.fusion.sheets import NORMAL_ROUNDS, without_second_sheets
 from scanweld.fusion.surface import extract_surface, vertex_flags
-from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
+from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
