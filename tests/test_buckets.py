@@ -1,0 +1,24 @@
+"""The nearest point within a radius, against looking at all of them."""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from scanweld.geometry.buckets import into_buckets, nearest_within
+
+
+def test_nearest_points_are_found_wherever_they_are():
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-3.0, 3.0, (2000, 3))
+    places = rng.uniform(-3.5, 3.5, (500, 3))
+    order, start = into_buckets(points, 0.5)
+    assert sorted(order) == list(range(len(points))) and start[-1] == len(points)
+    found = [nearest_within(points, order, start, 0.25, *place) for place in places]
+    apart, nearest = KDTree(points).query(places, distance_upper_bound=0.25)
+    np.testing.assert_array_equal(found, np.where(np.isfinite(apart), nearest, -1))
+    assert 0 < np.isfinite(apart).sum() < len(places)
+
+
+def test_few_points_and_none():
+    for points in (np.zeros((0, 3)), np.ones((1, 3))):
+        order, start = into_buckets(points, 1.0)
+        assert nearest_within(points, order, start, 0.5, 1.2, 1.0, 1.0) == len(points) - 1
