@@ -61,7 +61,7 @@ def test_slits_are_closed_though_they_are_longer_than_pinholes():
     corner = (x + 21 * y)[(x < 20) & (y < 20)]
     squares = [[corner, corner + 1, corner + 22], [corner, corner + 22, corner + 21]]
     faces = np.stack([np.stack(part, axis=1) for part in squares], axis=1).reshape(-1, 3)
-    vertices = np.stack([x, 0.3 * y, 0.0 * x], axis=1)
+    vertices = np.stack([x, 0.3 * y, np.zeros(len(x))], axis=1).astype(np.float64)
     middle = vertices[faces].mean(axis=1)
     flags = np.zeros(len(vertices), dtype=bool)
     slit = (np.abs(middle[:, 0] - 10.0) < 4) & (np.abs(middle[:, 1] - 3.15) < 0.1)
