@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 
 @njit(cache=True, nogil=True)
@@ -54,6 +54,33 @@ def nearest_within(
             away = (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 + (points[p, 2] - z) ** 2
             if away < best or (away == best and p < found):
                 best, found = away, p
+    return found
+
+
+@njit(cache=True, nogil=True)
+def are_beside(
+    points: FloatArray, order: IntArray, start: IntArray, radius: float, enough: int
+) -> BoolArray:  # pragma: no cover - compiled
+    """Which points (N,) have enough others within the radius; cubes are twice as large."""
+    cube, size = 2.0 * radius, len(start) - 1
+    found = np.zeros(len(points), np.bool_)
+    for v in range(len(points)):
+        x, y, z = points[v, 0], points[v, 1], points[v, 2]
+        i, j = int(np.floor(x / cube - 0.5)), int(np.floor(y / cube - 0.5))
+        m, count, corner = int(np.floor(z / cube - 0.5)), -1, 0
+        while corner < 8 and count < enough:
+            di, dj, dm = corner & 1, corner >> 1 & 1, corner >> 2
+            bucket = _bucket(i + di, j + dj, m + dm, size)
+            for p in order[start[bucket] : start[bucket + 1]]:
+                px, py, pz = points[p, 0], points[p, 1], points[p, 2]
+                # Other cubes share the bucket: they count when their own turn comes.
+                here = int(np.floor(px / cube)) == i + di and int(np.floor(py / cube)) == j + dj
+                if here and int(np.floor(pz / cube)) == m + dm:
+                    count += (px - x) ** 2 + (py - y) ** 2 + (pz - z) ** 2 < radius * radius
+                    if count >= enough:
+                        break
+            corner += 1
+        found[v] = count >= enough
     return found
 
 
