@@ -21,8 +21,8 @@ _RADIUS_VOXELS = 0.75
 _MAX_PEELS = 8
 """Rounds of removing second sheets, at most; usually two or three are enough."""
 _PATCH_EDGES = 12
-"""Second sheets are removed within so many edges of where something lies before or behind: far
-enough that the rim of such a patch changes nothing."""
+"""Second sheets are removed within so many edges of where they are found at first: far enough that
+the rim of such a patch changes nothing."""
 NORMAL_ROUNDS = 1
 """Rounds of averaging normals: thin triangles would tilt the normals of their corners."""
 
@@ -45,8 +45,13 @@ def without_second_sheets(
     Returns:
         Vertices (W, 3) and faces (G, 3).
     """
+    faces, parts = split_fans(faces)
+    vertices = vertices[parts]
+    agreement = Agreement(count=agreement.count[parts], stdev=agreement.stdev[parts])
     normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
-    in_patch = _opposite(vertices, normals, voxel) >= 0
+    in_patch = second_sheets(vertices, faces, normals, voxel) >= 0
+    if not in_patch.any():
+        return vertices, faces
     for _ in range(_PATCH_EDGES):
         in_patch[faces[in_patch[faces].any(axis=1)]] = True
     is_patch = in_patch[faces].any(axis=1)
