@@ -60,10 +60,23 @@ def test_same_bytes_whatever_the_blocks_at_a_time(monkeypatch: pytest.MonkeyPatc
     expected = fuse(*sphere_scans(), CONFIG)
     for chunk in (None, 1):
         if chunk is not None:
-            monkeypatch.setattr("scanweld.fusion.surface.CHUNK", chunk)
+            monkeypatch.setattr("scanweld.fusion.integrate.CHUNK", chunk)
         mesh = fuse(*sphere_scans(), CONFIG)
         assert mesh.vertices.tobytes() == expected.vertices.tobytes()
         assert mesh.faces.tobytes() == expected.faces.tobytes()
+
+
+@pytest.mark.parametrize("model", [CameraModel.ORTHOGRAPHIC, CameraModel.PINHOLE])
+def test_blocks_that_are_passed_over_hold_nothing(
+    model: CameraModel, monkeypatch: pytest.MonkeyPatch
+):
+    """The same bytes as of all blocks, seen by every image as far as it goes."""
+    expected = fuse(*sphere_scans(model), CONFIG)
+    no_ends = tuple(np.full((99, 99), np.inf, np.float32) for _ in range(2))
+    monkeypatch.setattr("scanweld.fusion.integrate._tiles", lambda *_: no_ends)
+    mesh = fuse(*sphere_scans(model), CONFIG)
+    assert mesh.vertices.tobytes() == expected.vertices.tobytes()
+    assert mesh.faces.tobytes() == expected.faces.tobytes()
 
 
 @pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])

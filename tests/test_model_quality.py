@@ -11,7 +11,7 @@ from benchmarks.surface.surface_defects import surface_defects
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.views import view_of
-from scanweld.fusion import fuse
+from scanweld.fusion import fuse, voxel_edge
 from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.color import exposure_gains
 from scanweld.fusion.noise import scan_noise
@@ -66,14 +66,14 @@ def test_order_and_workers_do_not_matter():
 
 
 def test_full_resolution_is_used_though_the_working_image_is_coarse():
-    """A scan of 300 pixels, prepared at 100: the voxels are those of the scan."""
-    view = view_of(sphere(RADIUS), 0, 0, pixels=300.0, model=CameraModel.ORTHOGRAPHIC)
+    """A scan of 450 pixels, prepared at 100: the voxels are those of the scan."""
+    view = view_of(sphere(RADIUS), 0, 0, pixels=450.0, model=CameraModel.ORTHOGRAPHIC)
     scan = prepare(one_scan(sphere(RADIUS), view, 0, 0.0), PrepareConfig(image_pixels=100))
     mesh = fuse([scan], [view.world_from_sensor], OPEN)
     edges = np.linalg.norm(
         mesh.vertices[mesh.faces[:, 0]] - mesh.vertices[mesh.faces[:, 1]], axis=1
     )
-    assert np.median(edges) < 1.2 * scan.resolution < 0.5 * scan.image.pixel
+    assert np.median(edges) < 1.1 * voxel_edge([scan], OPEN) < 0.5 * scan.image.pixel
     bounded = fuse([scan], [view.world_from_sensor], FusionConfig(max_voxels_across=50))
     assert len(bounded.faces) < 0.1 * len(mesh.faces)
 
@@ -200,7 +200,7 @@ def test_holes_are_closed_and_what_closes_them_is_marked(holes: str):
     assert closed.filled is not None and closed.support is not None and closed.stdev is not None
     np.testing.assert_array_equal(closed.filled, closed.support == 0)
     np.testing.assert_array_equal(closed.filled, np.isnan(closed.stdev))
-    voxel = scans[0].resolution
+    voxel = voxel_edge(scans, OPEN)
     depth = left_open.vertices[:, 2].min()
     low = closed.vertices[:, 2] < depth - 3.0 * voxel
     assert closed.filled[low].all()

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scanweld.fusion.posed_image import PosedImage
 from scanweld.fusion.sampling import sample_surface
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS
-from scanweld.geometry.prepared import MIN_COSINE
 
 _PRIOR_SCANS = 4.0
 """The scans' overall noise counts like the scatter of so many scans at a vertex: of two or three
@@ -47,7 +45,7 @@ def measure_agreement(
     size = len(vertices)
     count, total, squares, scatter = (np.zeros(size) for _ in range(4))
     for image in images:
-        distance, weight = weights_at(image, vertices, normals)
+        distance, weight = sample_surface(image, vertices, normals)
         reach = max(voxel, SIGNIFICANT_SIGMAS * image.noise)
         agrees = (weight > 0) & (np.abs(distance) < reach)
         w = np.where(agrees, image.precision * weight, 0.0)
@@ -60,13 +58,3 @@ def measure_agreement(
     expected = np.divide(squares, total**2, out=np.full(size, np.nan), where=known)
     factor = (_PRIOR_SCANS + scatter) / (_PRIOR_SCANS + np.maximum(count - 1, 0))
     return Agreement(count=count.astype(np.int64), stdev=np.sqrt(expected * factor))
-
-
-def weights_at(
-    image: PosedImage, vertices: FloatArray, normals: FloatArray
-) -> tuple[NDArray, NDArray]:
-    """Distances (V,) of vertices from an image's surface, and weights (V,), 0 where it has none."""
-    distance, weight = sample_surface(image, vertices)
-    rays = image.camera.view_directions(image.sensor_from_world.apply(vertices))
-    cosine = -np.einsum("vk,vk->v", image.sensor_from_world.turn(normals), rays)
-    return distance, np.where(cosine > MIN_COSINE, weight, np.float32(0))

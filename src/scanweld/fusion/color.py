@@ -7,10 +7,9 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import KDTree
 
-from scanweld.fusion.agreement import weights_at
 from scanweld.fusion.noise import MIN_COMMON
 from scanweld.fusion.posed_image import PosedImage, SingleArray
-from scanweld.fusion.sampling import sample_colors
+from scanweld.fusion.sampling import sample_colors, sample_surface
 from scanweld.geometry.arrays import ByteArray, FloatArray
 
 logger = logging.getLogger(__name__)
@@ -104,7 +103,7 @@ def _log_colors(color: FloatArray, share: SingleArray) -> FloatArray:
 def _colors_at(
     image: PosedImage, vertices: FloatArray, normals: FloatArray, reach: float
 ) -> tuple[FloatArray, SingleArray]:
-    distance, weight = weights_at(image, vertices, normals)
+    distance, weight = sample_surface(image, vertices, normals)
     color, _ = sample_colors(image, vertices)
     near = np.abs(distance) < reach
     return color.astype(np.float64), np.where(near, weight, np.float32(0))

@@ -4,8 +4,8 @@ import logging
 
 import fast_simplification
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
+from numba import njit
+from scipy.sparse import csr_array, diags_array
 from scipy.spatial import KDTree
 
 from scanweld.config import Component
@@ -15,14 +15,22 @@ from scanweld.geometry.mesh import (
     border_edges,
     border_vertices,
     compact,
+    connected,
+    corners_at,
     face_normals,
+    next_corner,
+    opposite_edges,
     pieces,
 )
 
 logger = logging.getLogger(__name__)
 
-_MIN_PIECE_VOXELS = 50.0
-"""Area, in squared voxels, below which a connected piece is dropped whatever its share."""
+_MIN_PIECE_VOXELS = 30.0
+"""Area, in squared voxels, below which a connected piece is dropped whatever its share; each is
+worth 1.5 points of a scan."""
+_SLIT_SHARE = 0.05
+"""Twice a hole's area over its border is its width, if it is a slit: one that is narrower than this
+share of the longest border of a pinhole."""
 _TAUBIN_STEPS = (0.5, -0.53)
 """Taubin's factors lambda and mu: a smoothing step, and one that undoes the shrinking."""
 
@@ -59,6 +67,8 @@ def close_pinholes(
 ) -> tuple[FloatArray, IntArray, BoolArray]:
     """Close the holes whose border is no longer than this, by a fan about their middle.
 
+    A border up to twice as long is closed as well, if it bounds no more than a slit.
+
     Args:
         vertices: (V, 3).
         faces: (F, 3) of a manifold: its borders are rings that do not touch.
@@ -68,10 +78,14 @@ def close_pinholes(
     start, end = border_edges(faces, len(vertices))
     if not len(start):
         return vertices, faces, filled
-    links = coo_array((np.ones(len(start)), (start, end)), shape=(len(vertices), len(vertices)))
-    ring = connected_components(links, directed=False)[1][start]
+    ring = connected(start, end, len(vertices))[start]
     length = np.bincount(ring, weights=np.linalg.norm(vertices[end] - vertices[start], axis=1))
-    chosen = length[ring] <= max_length
+    away = vertices[start] - vertices[start].mean(axis=0)
+    doubled = [
+        np.bincount(ring, weights=p) for p in np.cross(away, vertices[end] - vertices[start]).T
+    ]
+    is_slit = np.linalg.norm(doubled, axis=0) < _SLIT_SHARE * max_length * length
+    chosen = (length <= np.where(is_slit, 2.0, 1.0) * max_length)[ring]
     start, end = start[chosen], end[chosen]
     names, ring = np.unique(ring[chosen], return_inverse=True)
     number = np.bincount(ring, minlength=len(names))
@@ -160,40 +174,35 @@ def split_fans(faces: IntArray) -> tuple[IntArray, IntArray]:
     """
     if not len(faces):
         return faces, np.zeros(0, dtype=np.int64)
-    faces = _without_back_to_back(faces)
-    rows, columns = _linked_corners(faces)
-    links = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(faces.size,) * 2)
-    num_fans, fan = connected_components(links, directed=False)
-    vertex = np.zeros(num_fans, dtype=np.int64)
+    faces = np.ascontiguousarray(faces)
+    size = int(faces.max()) + 1
+    faces = faces[~_is_back_to_back(faces, *corners_at(faces, size))]
+    opposite = opposite_edges(faces, size)
+    edge = np.flatnonzero(opposite >= 0)
+    other = opposite[edge]
+    # Faces that share an edge run along it in opposite directions.
+    fan = connected(edge, next_corner(other), faces.size)
+    vertex = np.zeros(fan.max(initial=-1) + 1, dtype=np.int64)
     vertex[fan] = faces.ravel()
     order = np.argsort(vertex, kind="stable")  # numbered in the order of the old vertices
-    number = np.empty(num_fans, dtype=np.int64)
-    number[order] = np.arange(num_fans)
+    number = np.empty_like(order)
+    number[order] = np.arange(len(order))
     return number[fan].reshape(-1, 3), vertex[order]
 
 
-def _without_back_to_back(faces: IntArray) -> IntArray:
-    """The faces (G, 3) whose corners are those of no other one."""
-    corners = np.sort(faces, axis=1)
-    order = np.lexsort(corners.T)
-    alike = np.concatenate([[False], (np.diff(corners[order], axis=0) == 0).all(axis=1), [False]])
-    return faces[np.sort(order[~(alike[:-1] | alike[1:])])]
-
-
-def _linked_corners(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Corners (L,) of faces, numbered row by row, and those (L,) of the next face around a vertex.
-
-    Faces hang together by edges that only two of them have, and on whose outside they agree.
-    """
-    # Edge k of a face runs from its corner k to the next one.
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    edge = np.minimum(start, end) * (int(faces.max(initial=0)) + 1) + np.maximum(start, end)
-    order = np.argsort(edge, kind="stable")
-    first = np.flatnonzero(np.diff(edge[order], prepend=-1))
-    pairs = first[np.diff(first, append=faces.size) == 2]
-    a, b = order[pairs], order[pairs + 1]
-    # Two faces that agree on their outside run along their edge in opposite directions.
-    opposite = start[a] == end[b]
-    a, b = a[opposite], b[opposite]
-    after = np.roll(np.arange(faces.size).reshape(-1, 3), -1, axis=1).ravel()
-    return np.concatenate([a, after[a]]), np.concatenate([after[b], b])
+@njit(cache=True, nogil=True)
+def _is_back_to_back(
+    faces: IntArray, order: IntArray, start: IntArray
+) -> BoolArray:  # pragma: no cover - compiled
+    """Faces (F,) whose corners are those of another one, too."""
+    found = np.zeros(len(faces), np.bool_)
+    for vertex in range(len(start) - 1):
+        for k in range(start[vertex], start[vertex + 1]):
+            f, at = order[k] // 3, order[k] % 3
+            one, two = faces[f, (at + 1) % 3], faces[f, (at + 2) % 3]
+            for m in range(start[vertex], k):
+                g, at = order[m] // 3, order[m] % 3
+                after, before = faces[g, (at + 1) % 3], faces[g, (at + 2) % 3]
+                if (after == two and before == one) or (after == one and before == two):
+                    found[f] = found[g] = True
+    return found

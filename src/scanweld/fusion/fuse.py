@@ -18,23 +18,21 @@ from scanweld.fusion.finish import (
     split_fans,
 )
 from scanweld.fusion.holes import closed_field
+from scanweld.fusion.integrate import integrate
 from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
 from scanweld.fusion.sheets import NORMAL_ROUNDS, without_second_sheets
 from scanweld.fusion.surface import extract_surface, vertex_flags
-from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume, integrate
+from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume
+from scanweld.fusion.voxels import image_pixels, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.preparation.range_image import natural_pixel
 from scanweld.work.threads import map_in_order
 
 logger = logging.getLogger(__name__)
 
-_FINE_SHARE = 0.25
-"""Quantile of the scans' resolutions that sets the voxels: one fine scan is no reason for fine
-voxels everywhere, but where a quarter of the scans are fine, the coarse ones must not blur them."""
 _PINHOLE_VOXELS = 12.0
 """Length of the border, in voxels, up to which a hole is closed: it comes from a single cell."""
 _FILLED_ROUNDS = 20
@@ -101,7 +99,7 @@ def _images(
         zip(scans, world_from_sensor, strict=True),
         key=lambda both: (both[0].content_hash, both[1].matrix().tobytes()),
     )
-    pixels = _pixels([scan for scan, _ in posed], config)
+    pixels = image_pixels([scan for scan, _ in posed], config)
     images = list(
         map_in_order(
             lambda k: pose_image(*posed[k], pixels[k], prepare),
@@ -113,24 +111,6 @@ def _images(
     return with_noise(
         [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)]
     )
-
-
-def voxel_edge(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
-    """Edge of the voxels that scans are fused in, in their unit."""
-    pairs = zip(_pixels(scans, config), scans, strict=True)
-    footprints = [min(pixel, scan.image.pixel) for pixel, scan in pairs]
-    resolution = float(np.quantile(footprints, _FINE_SHARE))
-    return max(config.voxel_resolutions * resolution, _finest(scans, config))
-
-
-def _pixels(scans: Sequence[PreparedScan], config: FusionConfig) -> list[float]:
-    """Footprints of the images' pixels: as fine as the scans, but no finer than voxels may be."""
-    finest = _finest(scans, config)
-    return [max(natural_pixel(scan.scan, scan.resolution), finest) for scan in scans]
-
-
-def _finest(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
-    return max(scan.diameter for scan in scans) / config.max_voxels_across
 
 
 def _surface(

@@ -16,13 +16,13 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import map_coordinates
 
+from scanweld.fusion.integrate import add_images
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.volume import (
     BLOCK,
     DEPTH_VOXELS,
     MIN_EMPTY,
     Volume,
-    add_images,
     block_keys,
     blocks_of,
     empty_volume,

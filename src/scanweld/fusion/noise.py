@@ -105,18 +105,11 @@ def _between_pixels(image: PosedImage) -> tuple[FloatArray, FloatArray]:
 
 def _spread(points: tuple[FloatArray, FloatArray], image: PosedImage) -> tuple[float, int]:
     """Robust standard deviation of the distances of points to a surface, and their number."""
-    distance, weight = sample_surface(image, points[0])
-    faces_sensor = _towards(image, *points) > _MIN_COSINE
-    near = (weight > 0) & faces_sensor & (np.abs(distance) < _REACH_PIXELS * image.pixel)
+    distance, weight = sample_surface(image, *points, _MIN_COSINE)
+    near = (weight > 0) & (np.abs(distance) < _REACH_PIXELS * image.pixel)
     if not near.any():
         return 0.0, 0
     return MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), int(near.sum())
-
-
-def _towards(image: PosedImage, points: FloatArray, normals: FloatArray) -> FloatArray:
-    """Cosine (P,) between normals and the way back to an image's sensor."""
-    rays = image.camera.view_directions(image.sensor_from_world.apply(points))
-    return -np.einsum("pk,pk->p", image.sensor_from_world.turn(normals), rays)
 
 
 def _own_noise(image: PosedImage) -> float:

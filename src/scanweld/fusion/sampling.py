@@ -9,18 +9,24 @@ from numba import njit
 
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
+from scanweld.geometry.prepared import MIN_COSINE
 
 
-def sample_surface(image: PosedImage, points: FloatArray) -> tuple[SingleArray, SingleArray]:
+def sample_surface(
+    image: PosedImage, points: FloatArray, normals: FloatArray, min_cosine: float = MIN_COSINE
+) -> tuple[SingleArray, SingleArray]:
     """Signed distances (P,) of points (P, 3), world frame, to an image's surface, and weights (P,).
 
-    Distances are positive towards the sensor. The weight is 0 where the image has no surface.
+    Distances are positive towards the sensor. The weight is 0 where the image has no surface, or
+    where its sensor would see the points' normals (P, 3) more obliquely than a cosine.
     """
-    local = np.ascontiguousarray(image.sensor_from_world.apply(points))
     distance = np.zeros(len(points), np.float32)
     weight = np.zeros(len(points), np.float32)
     _sample(
-        local,
+        np.ascontiguousarray(points),
+        np.ascontiguousarray(normals),
+        min_cosine,
+        image.sensor_from_world.matrix(),
         image.camera.parameters,
         image.depth,
         image.normals,
@@ -132,8 +138,25 @@ def _pixel_near(
 
 
 @njit(cache=True, nogil=True)
+def _cosine(
+    camera: FloatArray, sensor_from_world: FloatArray, n: FloatArray, x: float, y: float, z: float
+) -> float:  # pragma: no cover - compiled
+    """Cosine between a normal, world frame, and the way from (x, y, z) back to the sensor."""
+    m = sensor_from_world
+    back = m[2, 0] * n[0] + m[2, 1] * n[1] + m[2, 2] * n[2]
+    if camera[0] == 0.0:
+        back = back * z + x * (m[0, 0] * n[0] + m[0, 1] * n[1] + m[0, 2] * n[2])
+        back += y * (m[1, 0] * n[0] + m[1, 1] * n[1] + m[1, 2] * n[2])
+        back /= np.sqrt(x * x + y * y + z * z)
+    return -back
+
+
+@njit(cache=True, nogil=True)
 def _sample(
     points: FloatArray,
+    point_normals: FloatArray,
+    min_cosine: float,
+    sensor_from_world: FloatArray,
     camera: FloatArray,
     depth: SingleArray,
     normals: SingleArray,
@@ -143,10 +166,16 @@ def _sample(
     found: SingleArray,
 ) -> None:  # pragma: no cover - compiled
     height, width = depth.shape
+    m = sensor_from_world
     for k in range(points.shape[0]):
-        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+        px, py, pz = points[k, 0], points[k, 1], points[k, 2]
+        x = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz + m[0, 3]
+        y = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz + m[1, 3]
+        z = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz + m[2, 3]
         u, v = project(camera, x, y, z)
         if not (-0.5 <= u < width - 0.5 and -0.5 <= v < height - 0.5):
+            continue
+        if _cosine(camera, m, point_normals[k], x, y, z) <= min_cosine:
             continue
         row, column = _pixel_near(weight, u, v)
         if row < 0:

@@ -1,13 +1,13 @@
 """Double layers of a surface: two sheets that face the same way, one close behind the other."""
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.spatial import KDTree
+from numba import njit
 
 from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.finish import split_fans
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-from scanweld.geometry.mesh import smoothed_normals
+from scanweld.geometry.buckets import into_buckets, nearest_within
+from scanweld.geometry.mesh import corners_at, smoothed_normals
 
 _SAME_SIDE = 0.7
 """Cosine of the angle between their normals above which two sheets face the same way; those of a
@@ -20,6 +20,9 @@ _RADIUS_VOXELS = 0.75
 """Distance from a point on the normal within which a vertex of the other sheet is looked for."""
 _MAX_PEELS = 8
 """Rounds of removing second sheets, at most; usually two or three are enough."""
+_PATCH_EDGES = 12
+"""Second sheets are removed within so many edges of where they are found at first: far enough that
+the rim of such a patch changes nothing."""
 NORMAL_ROUNDS = 1
 """Rounds of averaging normals: thin triangles would tilt the normals of their corners."""
 
@@ -42,15 +45,29 @@ def without_second_sheets(
     Returns:
         Vertices (W, 3) and faces (G, 3).
     """
+    faces, parts = split_fans(faces)
+    vertices = vertices[parts]
+    agreement = Agreement(count=agreement.count[parts], stdev=agreement.stdev[parts])
+    normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
+    in_patch = second_sheets(vertices, faces, normals, voxel) >= 0
+    if not in_patch.any():
+        return vertices, faces
+    for _ in range(_PATCH_EDGES):
+        in_patch[faces[in_patch[faces].any(axis=1)]] = True
+    is_patch = in_patch[faces].any(axis=1)
+    patch = _peeled(vertices, faces[is_patch], agreement, voxel)
+    faces, parts = split_fans(np.concatenate([faces[~is_patch], patch]))
+    return vertices[parts], faces
+
+
+def _peeled(vertices: FloatArray, faces: IntArray, agreement: Agreement, voxel: float) -> IntArray:
+    """The faces (G, 3) that stay."""
     index = np.arange(len(vertices))
     for _ in range(_MAX_PEELS):
         faces, parts = split_fans(faces)
         index = index[parts]
-        if not len(faces):
-            break
         points = vertices[index]
-        normals = smoothed_normals(points, faces, NORMAL_ROUNDS)
-        other = second_sheets(points, faces, normals, voxel)
+        other = second_sheets(points, faces, smoothed_normals(points, faces, NORMAL_ROUNDS), voxel)
         one = np.flatnonzero(other >= 0)
         if not len(one):
             break
@@ -60,7 +77,7 @@ def without_second_sheets(
         goes = np.zeros(len(index), dtype=bool)
         goes[np.where((fewer < 0) | ((fewer == 0) & is_worse), one, two)] = True
         faces = faces[~goes[faces].any(axis=1)]
-    return vertices[index], faces
+    return index[faces]
 
 
 def second_sheets(
@@ -74,34 +91,65 @@ def second_sheets(
         normals: (V, 3) unit.
         voxel: Edge of a voxel.
     """
-    tree = KDTree(vertices)
-    least, most = _APART_VOXELS
-    other = np.full(len(vertices), -1)
-    for step in np.arange(least + 0.5, most, _RADIUS_VOXELS):
-        for side in (1.0, -1.0):
-            places = vertices + side * step * voxel * normals
-            apart, nearest = tree.query(places, distance_upper_bound=_RADIUS_VOXELS * voxel)
-            found = np.flatnonzero(np.isfinite(apart) & (other < 0))
-            index = np.asarray(nearest)[found]
-            between = vertices[index] - vertices[found]
-            offset = np.abs(np.einsum("vk,vk->v", between, normals[found]))
-            alike = np.einsum("vk,vk->v", normals[index], normals[found]) > _SAME_SIDE
-            is_sheet = alike & (offset > least * voxel)
-            other[found[is_sheet]] = index[is_sheet]
+    other = _opposite(vertices, normals, voxel)
     one = np.flatnonzero(other >= 0)
-    other[one[_hang_together(one, other[one], faces, len(vertices))]] = -1
+    faces = np.ascontiguousarray(faces)
+    other[one[_hang_together(one, other[one], faces, *corners_at(faces, len(vertices)))]] = -1
     return other
 
 
-def _hang_together(one: IntArray, two: IntArray, faces: IntArray, size: int) -> BoolArray:
+def _opposite(vertices: FloatArray, normals: FloatArray, voxel: float) -> IntArray:
+    """The vertex (V,) before or behind each that faces the same way, -1 without."""
+    # In voxels from a corner: what is far from the origin of the world has no other neighbours.
+    points = (vertices - vertices.min(axis=0, initial=np.inf)) / voxel
+    return _find_opposite(points, normals, *into_buckets(points, 2.0 * _RADIUS_VOXELS))
+
+
+@njit(cache=True, nogil=True)
+def _find_opposite(
+    points: FloatArray, normals: FloatArray, order: IntArray, start: IntArray
+) -> IntArray:  # pragma: no cover - compiled
+    least, most = _APART_VOXELS
+    other = np.full(len(points), -1)
+    for v in range(len(points)):
+        x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
+        step, side = least + 0.5, 1.0
+        while step < most and other[v] < 0:
+            px, py, pz = points[v, 0], points[v, 1], points[v, 2]
+            ahead = side * step
+            found = nearest_within(
+                points, order, start, _RADIUS_VOXELS, px + ahead * x, py + ahead * y, pz + ahead * z
+            )
+            if found >= 0:
+                alike = x * normals[found, 0] + y * normals[found, 1] + z * normals[found, 2]
+                offset = x * (points[found, 0] - px) + y * (points[found, 1] - py)
+                offset += z * (points[found, 2] - pz)
+                if alike > _SAME_SIDE and abs(offset) > least:
+                    other[v] = found
+            if side < 0.0:
+                step += _RADIUS_VOXELS
+            side = -side
+    return other
+
+
+@njit(cache=True, nogil=True)
+def _hang_together(
+    one: IntArray, two: IntArray, faces: IntArray, order: IntArray, start: IntArray
+) -> BoolArray:  # pragma: no cover - compiled
     """Whether vertices one (K,) and two (K,) are a few edges apart at most."""
-    if not len(one):
-        return np.zeros(0, dtype=bool)
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    links = csr_array((np.ones(len(start), np.int8), (start, end)), shape=(size, size))
-    links = ((links + links.T) > 0).astype(np.int8)
-    around = links[one]
-    for _ in range(_MAX_EDGES - 1):
-        around = ((around + around @ links) > 0).astype(np.int8)
-    near = around.tocoo()
-    return np.bincount(near.row, weights=near.col == two[near.row], minlength=len(one)) > 0
+    found = np.zeros(len(one), np.bool_)
+    seen_by = np.full(len(start), -1)
+    for k in range(len(one)):
+        front = [one[k]]
+        seen_by[one[k]] = k
+        for _ in range(_MAX_EDGES):
+            after = [one[k]]
+            for vertex in front:
+                for corner in order[start[vertex] : start[vertex + 1]]:
+                    for neighbour in faces[corner // 3]:
+                        if seen_by[neighbour] != k:
+                            seen_by[neighbour] = k
+                            after.append(neighbour)
+            front = after
+        found[k] = seen_by[two[k]] == k
+    return found

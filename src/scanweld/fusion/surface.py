@@ -1,14 +1,17 @@
 """From signed distances to triangles, where there are distances."""
 
 import numpy as np
+from numba import njit
 
 from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
 from scanweld.fusion.posed_image import SingleArray
-from scanweld.fusion.volume import BLOCK, CHUNK, Volume, block_keys, blocks_of
+from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 _MIN_STEP = 0.02
 """Vertices keep this share of a voxel's edge away from its ends: no triangle shrinks to nothing."""
+_HASH = 0x9E3779B1
+"""Odd, 2^32 over the golden ratio (Knuth): its products scatter keys over a table."""
 
 
 def extract_surface(
@@ -25,65 +28,107 @@ def extract_surface(
         has one face at the border of what was seen, two elsewhere.
     """
     distance = volume.mean_distance() if distance is None else distance
-    found: list[tuple[IntArray, FloatArray]] = []
-    corners: list[IntArray] = []
-    num_found = 0
-    for start in range(0, len(volume.blocks), CHUNK):
-        index = np.arange(start, min(start + CHUNK, len(volume.blocks)))
-        keys, ends = _cell_edges(volume, distance, index)
-        keys, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
-        found.append((keys, ends[first]))
-        corners.append(inverse.reshape(-1) + num_found)
-        num_found += len(keys)
-    keys, first, inverse = np.unique(
-        np.concatenate([keys for keys, _ in found]), return_index=True, return_inverse=True
-    )
-    vertices = _vertices(volume, keys, np.concatenate([ends for _, ends in found])[first])
-    faces = inverse.reshape(-1)[np.concatenate(corners)].reshape(-1, 3)
-    return vertices, faces.astype(np.int64)
+    beside = np.stack([volume.find(volume.blocks + step) for step in corner_offsets()], axis=1)
+    table, corners = triangle_table().reshape(256, -1), edge_corners()
+    sizes = _count(distance, beside, table)
+    vertices, faces = _march(distance, beside, volume.blocks, table, corners, *sizes)
+    return volume.origin + volume.voxel * vertices, faces
 
 
-def _cell_edges(
-    volume: Volume, distance: SingleArray, index: IntArray
-) -> tuple[IntArray, FloatArray]:
-    """Edges crossed by the surface, three a triangle, with the values at both of their ends.
-
-    Returns:
-        Keys (3 T,) of edges and values (3 T, 2).
-    """
-    padded = _with_neighbours(volume, distance, index)
-    offsets = corner_offsets()
-    corners = np.stack([padded[:, i:, j:, k:][:, :BLOCK, :BLOCK, :BLOCK] for i, j, k in offsets])
-    case = np.packbits(corners < 0, axis=0, bitorder="little")[0]
-    is_crossed = (case > 0) & (case < 255) & np.isfinite(corners).all(axis=0)
-    cell = np.argwhere(is_crossed)
-    edges = triangle_table().reshape(256, -1)[case[is_crossed]]
-    row, column = np.nonzero(edges >= 0)
-    edge = edges[row, column]
-    ends = edge_corners()[edge]
-    block, voxel = volume.blocks[index[cell[:, 0]]], cell[:, 1:]
-    base = (BLOCK * block + voxel)[row] + offsets[ends[:, 0]]
-    values = corners[:, is_crossed].T
-    return 3 * block_keys(base) + edge // 4, values[row[:, None], ends].astype(np.float64)
+@njit(cache=True, nogil=True)
+def _crossed(
+    distance: SingleArray, beside: IntArray, block: int, values: SingleArray
+) -> bool:  # pragma: no cover - compiled
+    """Whether distances have both signs; values (9, 9, 9) of a block and of the next voxels."""
+    least, most = np.inf, -np.inf
+    for i, j, k in np.ndindex(values.shape):
+        other = beside[block, i // BLOCK + 2 * (j // BLOCK) + 4 * (k // BLOCK)]
+        value = np.float32(np.nan)
+        if other >= 0:
+            value = distance[other, i % BLOCK, j % BLOCK, k % BLOCK]
+            least, most = min(least, value), max(most, value)
+        values[i, j, k] = value
+    return bool(least < 0.0 <= most)
 
 
-def _with_neighbours(volume: Volume, distance: SingleArray, index: IntArray) -> SingleArray:
-    """(N, 9, 9, 9) distances of blocks and of the next voxels; NaN where unseen."""
-    padded = np.full((len(index), BLOCK + 1, BLOCK + 1, BLOCK + 1), np.nan, np.float32)
-    for shift in corner_offsets():
-        other = volume.find(volume.blocks[index] + shift)
-        has_other = other >= 0
-        source = tuple(slice(0, 1) if s else slice(None) for s in shift)
-        target = tuple(slice(BLOCK, None) if s else slice(0, BLOCK) for s in shift)
-        padded[(has_other, *target)] = distance[(other[has_other], *source)]
-    return padded
+@njit(cache=True, nogil=True)
+def _case(values: SingleArray, i: int, j: int, k: int) -> int:  # pragma: no cover - compiled
+    """Which corners of a cell are inside, as bits; 0 if one of them is not known."""
+    case = 0
+    for c in range(8):
+        value = values[i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)]
+        if np.isnan(value):
+            return 0
+        case |= (value < 0.0) << c
+    return case
 
 
-def _vertices(volume: Volume, keys: IntArray, values: FloatArray) -> FloatArray:
-    """Where the distance is zero on edges, by linear interpolation."""
-    axis, base = keys % 3, blocks_of(keys // 3)
-    step = np.clip(values[:, 0] / (values[:, 0] - values[:, 1]), _MIN_STEP, 1 - _MIN_STEP)
-    return volume.origin + volume.voxel * (base + step[:, None] * np.eye(3)[axis])
+@njit(cache=True, nogil=True)
+def _count(
+    distance: SingleArray, beside: IntArray, table: IntArray
+) -> tuple[int, int]:  # pragma: no cover - compiled
+    """Number of faces, and of edges between voxels that the surface may cross."""
+    values = np.empty((BLOCK + 1, BLOCK + 1, BLOCK + 1), np.float32)
+    per_case = (table >= 0).sum(axis=1) // 3
+    num_faces, num_edges = 0, 0
+    for block in range(len(distance)):
+        if not _crossed(distance, beside, block, values):
+            continue
+        for i, j, k in np.ndindex((BLOCK, BLOCK, BLOCK)):
+            num_faces += per_case[_case(values, i, j, k)]
+            is_in = values[i, j, k] < 0.0
+            num_edges += is_in != (values[i + 1, j, k] < 0.0)
+            num_edges += is_in != (values[i, j + 1, k] < 0.0)
+            num_edges += is_in != (values[i, j, k + 1] < 0.0)
+    return num_faces, num_edges
+
+
+@njit(cache=True, nogil=True)
+def _march(
+    distance: SingleArray,
+    beside: IntArray,
+    blocks: IntArray,
+    table: IntArray,
+    edge_ends: IntArray,
+    num_faces: int,
+    num_edges: int,
+) -> tuple[FloatArray, IntArray]:  # pragma: no cover - compiled
+    """Vertices (V, 3), in voxels, and faces (F, 3); a hash table knows the edges that were met."""
+    values = np.empty((BLOCK + 1, BLOCK + 1, BLOCK + 1), np.float32)
+    size = 2
+    while 2 * size < 3 * num_edges:
+        size *= 2
+    keys, vertex_of = np.full(size, -1), np.empty(size, np.int32)
+    vertices, faces = np.empty((num_edges, 3)), np.empty((num_faces, 3), np.int64)
+    num_vertices, corner = 0, 0
+    for block in range(len(distance)):
+        if not _crossed(distance, beside, block, values):
+            continue
+        for i, j, k in np.ndindex((BLOCK, BLOCK, BLOCK)):
+            for edge in table[_case(values, i, j, k)]:
+                if edge < 0:
+                    break
+                first, second = edge_ends[edge]
+                x, y, z = i + (first & 1), j + (first >> 1 & 1), k + (first >> 2)
+                key = BLOCK * blocks[block, 0] + x
+                key = (key << KEY_BITS) | (BLOCK * blocks[block, 1] + y)
+                key = 3 * ((key << KEY_BITS) | (BLOCK * blocks[block, 2] + z)) + edge // 4
+                slot = (key * _HASH >> 20) & (size - 1)
+                while keys[slot] != key and keys[slot] >= 0:
+                    slot = (slot + 1) & (size - 1)
+                if keys[slot] < 0:
+                    keys[slot], vertex_of[slot] = key, num_vertices
+                    value = float(values[x, y, z])
+                    other = values[i + (second & 1), j + (second >> 1 & 1), k + (second >> 2)]
+                    step = min(max(value / (value - other), _MIN_STEP), 1 - _MIN_STEP)
+                    vertices[num_vertices, 0] = BLOCK * blocks[block, 0] + x
+                    vertices[num_vertices, 1] = BLOCK * blocks[block, 1] + y
+                    vertices[num_vertices, 2] = BLOCK * blocks[block, 2] + z
+                    vertices[num_vertices, edge // 4] += step
+                    num_vertices += 1
+                faces[corner // 3, corner % 3] = vertex_of[slot]
+                corner += 1
+    return vertices[:num_vertices].copy(), faces
 
 
 def vertex_flags(volume: Volume, flags: BoolArray, vertices: FloatArray) -> BoolArray:

@@ -1,12 +1,14 @@
 """Triangles between neighbouring cells of a grid, cut at depth jumps."""
 
 import numpy as np
+from numba import njit
 
-from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray, IntArray
 
 GAP_ROUNDS = 2
 """Gaps between measured cells (pixels or voxels) are lost returns, up to this many cells from the
 nearest measured one: they are filled from their neighbours in so many rounds."""
+_NO_FACES = np.empty((0, 3), np.int64)
 
 
 def grid_faces(
@@ -28,40 +30,56 @@ def grid_faces(
     Returns:
         (F, 3) indices of points.
     """
-    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, :-1], grid[1:, 1:]
-    has = [corner.ravel() >= 0 for corner in (a, b, c, d)]
-    a, b, c, d = (corner.ravel() for corner in (a, b, c, d))
-    full = has[0] & has[1] & has[2] & has[3]
-    across_ad = np.zeros(len(a))
-    across_bc = np.zeros(len(a))
-    across_ad[full] = np.linalg.norm(points[a[full]] - points[d[full]], axis=1)
-    across_bc[full] = np.linalg.norm(points[b[full]] - points[c[full]], axis=1)
-    along_ad = full & (across_ad <= across_bc)
-    along_bc = full & ~along_ad
-    num = has[0].astype(int) + has[1] + has[2] + has[3]
-    three = num == 3
-    candidates = [
-        _stack(along_ad | (three & ~has[1]), a, d, c),
-        _stack(along_ad | (three & ~has[2]), a, b, d),
-        _stack(along_bc | (three & ~has[3]), a, b, c),
-        _stack(along_bc | (three & ~has[0]), b, d, c),
-    ]
-    faces = np.concatenate(candidates)
-    return faces[_is_smooth(faces, points, depth, max_step, max_edge)]
+    arrays = np.ascontiguousarray(grid), np.ascontiguousarray(points), np.ascontiguousarray(depth)
+    faces = np.empty((_find_faces(*arrays, max_step, max_edge, _NO_FACES), 3), np.int64)
+    _find_faces(*arrays, max_step, max_edge, faces)
+    return faces
 
 
-def _stack(chosen: BoolArray, a: IntArray, b: IntArray, c: IntArray) -> IntArray:
-    # (a, b, c) go clockwise on screen; seen from the sensor that is a normal towards it.
-    return np.stack([a[chosen], c[chosen], b[chosen]], axis=1)
+@njit(cache=True, nogil=True)
+def _find_faces(
+    grid: IntArray,
+    points: FloatArray,
+    depth: FloatArray,
+    max_step: float,
+    max_edge: float,
+    faces: IntArray,
+) -> int:  # pragma: no cover - compiled
+    """Write the triangles, as many as there is room for, and tell their number."""
+    count = 0
+    for way in range(4):
+        for i, j in np.ndindex((max(grid.shape[0] - 1, 0), max(grid.shape[1] - 1, 0))):
+            a, b = int(grid[i, j]), int(grid[i, j + 1])
+            c, d = int(grid[i + 1, j]), int(grid[i + 1, j + 1])
+            num = (a >= 0) + (b >= 0) + (c >= 0) + (d >= 0)
+            if num < 3:
+                continue
+            along_ad = num == 4 and _apart(points, a, d) <= _apart(points, b, c)
+            # (a, b, c) go clockwise on screen; seen from the sensor that is a normal towards it.
+            if way == 0:
+                wanted, p, q, r = along_ad if num == 4 else b < 0, a, c, d
+            elif way == 1:
+                wanted, p, q, r = along_ad if num == 4 else c < 0, a, d, b
+            elif way == 2:
+                wanted, p, q, r = not along_ad if num == 4 else d < 0, a, c, b
+            else:
+                wanted, p, q, r = not along_ad if num == 4 else a < 0, b, c, d
+            if not wanted:
+                continue
+            smooth = True
+            for one, two in ((p, q), (q, r), (r, p)):
+                step = abs(depth[one] - depth[two])
+                across = _apart(points, one, two) - step * step
+                smooth = smooth and step <= max_step and across <= max_edge * max_edge
+            if smooth:
+                if count < len(faces):
+                    faces[count, 0], faces[count, 1], faces[count, 2] = p, q, r
+                count += 1
+    return count
 
 
-def _is_smooth(
-    faces: IntArray, points: FloatArray, depth: FloatArray, max_step: float, max_edge: float
-) -> BoolArray:
-    keep = np.ones(len(faces), dtype=bool)
-    for start, end in ((0, 1), (1, 2), (2, 0)):
-        p, q = faces[:, start], faces[:, end]
-        step = np.abs(depth[p] - depth[q])
-        length2 = ((points[p] - points[q]) ** 2).sum(axis=1)
-        keep &= (step <= max_step) & (length2 - step**2 <= max_edge**2)
-    return keep
+@njit(cache=True, nogil=True)
+def _apart(points: FloatArray, p: int, q: int) -> float:  # pragma: no cover - compiled
+    """Squared distance of two points."""
+    x, y = points[p, 0] - points[q, 0], points[p, 1] - points[q, 1]
+    return x * x + y * y + (points[p, 2] - points[q, 2]) ** 2

@@ -3,13 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from numba import njit
 
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
 
 MIN_PIECE_SHARE = 0.002
 """Connected pieces that are smaller than this share of a surface are taken for noise."""
+BORDER = -1
+"""For the face on the other side of an edge, where there is none,"""
+IN_CONFLICT = -2
+"""or where faces do not fit together along an edge."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -65,45 +68,18 @@ def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Unit vertex normals (V, 3), area-weighted; zero for vertices without a face."""
-    weighted = face_normals(vertices, faces)
-    normals = np.zeros_like(vertices)
-    for corner in range(3):
-        for axis in range(3):
-            normals[:, axis] += np.bincount(
-                faces[:, corner], weights=weighted[:, axis], minlength=len(vertices)
-            )
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    return smoothed_normals(vertices, faces, 0)
 
 
 def smoothed_normals(vertices: FloatArray, faces: IntArray, rounds: int) -> FloatArray:
     """Unit vertex normals (V, 3), averaged over the faces around again and again, by area."""
-    normals = vertex_normals(vertices, faces)
-    area = np.linalg.norm(face_normals(vertices, faces), axis=1, keepdims=True)
-    for _ in range(rounds):
-        mean = area * normals[faces].sum(axis=1)
-        summed = np.stack(
-            [
-                sum(
-                    np.bincount(faces[:, k], weights=mean[:, axis], minlength=len(vertices))
-                    for k in range(3)
-                )
-                for axis in range(3)
-            ],
-            axis=1,
-        )
-        length = np.linalg.norm(summed, axis=1, keepdims=True)
-        normals = np.where(length > 0, summed / np.where(length > 0, length, 1.0), normals)
-    return normals
+    return _normals(np.array(vertices, order="C"), np.array(faces, order="C"), rounds)
 
 
 def border_edges(faces: IntArray, num_vertices: int) -> tuple[IntArray, IntArray]:
     """First and last vertices (B,) of the edges that only one face has, as it runs along them."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    keys = np.minimum(start, end) * num_vertices + np.maximum(start, end)
-    _, first, counts = np.unique(keys, return_index=True, return_counts=True)
-    once = first[counts == 1]
-    return start[once], end[once]
+    once = np.flatnonzero(opposite_edges(faces, num_vertices) == BORDER)
+    return faces.ravel()[once], faces.ravel()[next_corner(once)]
 
 
 def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
@@ -113,16 +89,122 @@ def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
     return is_border
 
 
+def opposite_edges(faces: IntArray, num_vertices: int) -> IntArray:
+    """The edge (3 F,) of the other face along each face's edge; edge 3 f + k starts at corner k.
+
+    ``BORDER`` where no other face has the edge, ``IN_CONFLICT`` where more than two have it, or two
+    that do not agree on their outside.
+    """
+    faces = np.array(faces, order="C")
+    return _opposite_edges(faces, *corners_at(faces, num_vertices))
+
+
+def next_corner(corners: IntArray) -> IntArray:
+    """The next corners around their faces; corner 3 f + k is the k-th of face f."""
+    return corners - corners % 3 + (corners + 1) % 3
+
+
 def pieces(faces: IntArray, num_vertices: int) -> IntArray:
     """The connected piece (V,) of each vertex, from 0; one without a face is a piece by itself."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    edges = coo_array(
-        (np.ones(len(start), dtype=bool), (start, end)), shape=(num_vertices, num_vertices)
-    )
-    return connected_components(edges, directed=False)[1].astype(np.int64)
+    corners = faces.ravel()
+    return connected(corners, corners[next_corner(np.arange(faces.size))], num_vertices)
 
 
 def compact(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
     """Drop unused vertices: (vertices, faces, kept indices of the old vertices)."""
     kept, inverse = np.unique(faces, return_inverse=True)
     return vertices[kept], inverse.reshape(faces.shape), kept
+
+
+@njit(cache=True, nogil=True)
+def corners_at(
+    faces: IntArray, num_vertices: int
+) -> tuple[IntArray, IntArray]:  # pragma: no cover - compiled
+    """Corners (3 F,) sorted by their vertices, and where in them those of each (V + 1,) begin."""
+    start = np.zeros(num_vertices + 2, np.int64)
+    corners = faces.ravel()
+    for vertex in corners:
+        start[vertex + 2] += 1
+    start = np.cumsum(start)
+    order = np.empty(len(corners), np.int64)
+    for corner, vertex in enumerate(corners):
+        order[start[vertex + 1]] = corner
+        start[vertex + 1] += 1
+    return order, start[:-1]
+
+
+@njit(cache=True, nogil=True)
+def _opposite_edges(
+    faces: IntArray, order: IntArray, start: IntArray
+) -> IntArray:  # pragma: no cover - compiled
+    end = np.empty_like(order)
+    for k, edge in enumerate(order):
+        end[k] = faces[edge // 3, (edge + 1) % 3]
+    found = np.full(len(order), IN_CONFLICT)
+    for first in range(len(start) - 1):
+        for k in range(start[first], start[first + 1]):
+            last, other, alike, against = end[k], BORDER, 0, 0
+            for m in range(start[first], start[first + 1]):
+                alike += end[m] == last
+            for m in range(start[last], start[last + 1]):
+                if end[m] == first:
+                    other = order[m]
+                    against += 1
+            if alike == 1 and against <= 1:
+                found[order[k]] = other
+    return found
+
+
+@njit(cache=True, nogil=True)
+def connected(first: IntArray, second: IntArray, size: int) -> IntArray:  # pragma: no cover
+    """Numbers (size,), from 0, of the parts that links (L,) between so many things make."""
+    parent = np.arange(size)
+    for a, b in zip(first, second):  # noqa: B905 - Numba knows no strict
+        while parent[a] != a:
+            parent[a] = parent[parent[a]]
+            a = parent[a]
+        while parent[b] != b:
+            parent[b] = parent[parent[b]]
+            b = parent[b]
+        parent[max(a, b)] = min(a, b)
+    # A part's root is the least of it, so that it has its number before the others ask for it.
+    number, count = np.empty(size, np.int64), 0
+    for k in range(size):
+        if parent[k] == k:
+            number[k] = count
+            count += 1
+        else:
+            number[k] = number[parent[k]]
+    return number
+
+
+@njit(cache=True, nogil=True)
+def _normals(
+    vertices: FloatArray, faces: IntArray, rounds: int
+) -> FloatArray:  # pragma: no cover - compiled
+    normals = np.zeros(vertices.shape)
+    for turn in range(rounds + 1):
+        total = np.zeros(vertices.shape)
+        for f in range(len(faces)):
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            ux, uy = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1]
+            vx, vy = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1]
+            uz, vz = vertices[b, 2] - vertices[a, 2], vertices[c, 2] - vertices[a, 2]
+            x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            if turn > 0:
+                area = np.sqrt(x * x + y * y + z * z)
+                x = area * (normals[a, 0] + normals[b, 0] + normals[c, 0])
+                y = area * (normals[a, 1] + normals[b, 1] + normals[c, 1])
+                z = area * (normals[a, 2] + normals[b, 2] + normals[c, 2])
+            for vertex in (a, b, c):
+                total[vertex, 0] += x
+                total[vertex, 1] += y
+                total[vertex, 2] += z
+        for vertex in range(len(vertices)):
+            x, y, z = total[vertex, 0], total[vertex, 1], total[vertex, 2]
+            length = np.sqrt(x * x + y * y + z * z)
+            if length > 0.0:
+                normals[vertex, 0] = x / length
+                normals[vertex, 1] = y / length
+                normals[vertex, 2] = z / length
+    return normals

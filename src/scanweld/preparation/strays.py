@@ -1,9 +1,9 @@
 """Stray points: outliers and flying pixels, which are not part of any surface."""
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.buckets import are_beside, into_buckets
 from scanweld.geometry.scan import RangeScan
 
 MIN_NEIGHBOURS = 4
@@ -23,11 +23,9 @@ def without_strays(scan: RangeScan, points: FloatArray, spacing: float) -> Range
         points: (N, 3), its points in the sensor frame.
         spacing: Median spacing of its points.
     """
-    kept = _has_neighbours(points / np.array([1.0, 1.0, DEPTH_REACH]), REACH_SPACINGS * spacing)
+    if not spacing > 0:  # all points coincide
+        return scan.only(np.zeros(len(points), dtype=bool))
+    reach = REACH_SPACINGS * spacing
+    near = (points - points.min(axis=0, initial=np.inf)) / np.array([1.0, 1.0, DEPTH_REACH])
+    kept = are_beside(near, *into_buckets(near, 2.0 * reach), reach, MIN_NEIGHBOURS)
     return scan if kept.all() else scan.only(kept)
-
-
-def _has_neighbours(points: FloatArray, reach: float) -> BoolArray:
-    # The nearest of all is the point itself.
-    distance, _ = KDTree(points).query(points, k=MIN_NEIGHBOURS + 1, distance_upper_bound=reach)
-    return np.isfinite(distance[:, -1])
