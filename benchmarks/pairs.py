@@ -32,8 +32,8 @@ from scanweld.evaluation.metrics import MAX_ROTATION_DEG, MAX_TRANSLATION_PERCEN
 from scanweld.evidence.field import make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.heat.features import describe
-from scanweld.pairs.registrar import pair_registrar
+from scanweld.heat.features import Features, describe
+from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
@@ -88,18 +88,19 @@ def answers_of(scans: PairSet, seed: int, anchors: str, workers: int) -> list[Js
         # As a run does: the method's own way to register two scans, by index.
         prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), moved, workers))
         fields = list(map_in_order(make_field, prepared, workers))
-        features = [None] * len(prepared)
+        features: dict[int, Features] = {}
         if anchors != "even":
-            features = list(map_in_order(lambda p: describe(p, config.heat), prepared, workers))
+            described = map_in_order(lambda p: describe(p, config.heat), prepared, workers)
+            features = dict(enumerate(described))
         contours = contour_matcher(prepared, config.contours)
-        registrar = pair_registrar(prepared, features, fields, contours, config)
+        registrar = PairRegistrar(scans=prepared, fields=fields, contours=contours, config=config)
         diameter = object_diameter(moved, truth)
 
         def answer(edge: tuple[str, str]) -> Json:
             at_i, at_j = (k for k, scan in enumerate(prepared) if scan.name in edge)
             i, j = prepared[at_i], prepared[at_j]
             start = time.perf_counter()
-            result = registrar.register((at_i, at_j))
+            result = registrar.register((at_i, at_j), features)
             seconds = time.perf_counter() - start
             true = truth[i.name].inverse() @ truth[j.name]
             errors = [_error(i, j, each.i_from_j, true) for each in result.alternatives]

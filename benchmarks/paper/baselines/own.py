@@ -14,7 +14,7 @@ from scanweld.geometry.point_fit import FRACTION_EXPONENT, Trim
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features, describe
-from scanweld.pairs.registrar import pair_registrar
+from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.published.coarse import CoarseAnswer, register_as_published
 from scanweld.published.m_icc import m_icc as align_by_m_icc
@@ -73,14 +73,13 @@ def right_matches(
 def searched(pair: ScanPair, config: Config) -> PairResult:
     """What a run does for a pair, features and all."""
     scans = (pair.i, pair.j)
-    registrar = pair_registrar(
-        scans,
-        [describe(scan, config.heat) for scan in scans],
-        [make_field(scan) for scan in scans],
-        contour_matcher(scans, config.contours),
-        config,
+    registrar = PairRegistrar(
+        scans=scans,
+        fields=[make_field(scan) for scan in scans],
+        contours=contour_matcher(scans, config.contours),
+        config=config,
     )
-    return registrar.register((0, 1))
+    return registrar.register((0, 1), {k: describe(s, config.heat) for k, s in enumerate(scans)})
 
 
 def icp(pair: ScanPair, start: Pose, seed: int) -> Answer:
