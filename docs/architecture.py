@@ -16,8 +16,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PICTURE = ROOT / "docs" / "architecture.svg"
 
 LAYERS = (
-    ("__main__", "__init__"),
+    ("__main__",),
     ("app",),
+    ("__init__",),
     ("pipeline",),
     ("confidence", "knowledge"),
     ("graph", "published", "reconstruction"),

@@ -1,11 +1,13 @@
 """The command line as users meet it: exit codes, streams, and what is left on disk."""
 
+import inspect
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ import pytest
 
 from scanweld.app import job
 from scanweld.app.cli import main
+from scanweld.app.options import takes
 from scanweld.app.workspace import work_folder
 from scanweld.errors import InputError
 from scanweld.evaluation.scanner import scan_mesh
@@ -93,11 +96,11 @@ def test_files_patterns_and_folders_are_the_same(scans: Path):
 
 def test_options_reach_the_settings(scans: Path, seen: dict[str, Any]):
     Path("my.toml").write_text("seed = 3\n[pairs]\nnum_turns = 36\n[fusion]\nsmooth = 7\n")
-    options = ["--config", "my.toml", "--seed", "5", "--unit", "mm", "--workers", "2"]
+    options = ["--config", "my.toml", "--unit", "mm", "--workers", "2"]
     options += ["--holes", "carve", "--component", "largest", "--watertight", "--faces", "500"]
     assert scanweld("run", scans, "-o", "model", *options) == 0
     settings = report()["settings"]
-    assert (settings["seed"], settings["unit"], settings["pairs"]["num_turns"]) == (5, "mm", 36)
+    assert (settings["seed"], settings["unit"], settings["pairs"]["num_turns"]) == (3, "mm", 36)
     fusion = {"holes": "carve", "component": "largest", "watertight": True, "faces": 500}
     assert {**fusion, "smooth": 7}.items() <= settings["fusion"].items()
     assert seen["workers"] == 2
@@ -113,7 +116,8 @@ def test_options_reach_the_settings(scans: Path, seen: dict[str, Any]):
         ["run", "scans", "-o", "model", "--nonsense"],
         ["run", "scans", "-o", "model", "--workers", "0"],
         ["run", "scans", "-o", "model", "--workers", "two"],
-        ["run", "scans", "-o", "model", "--seed", "-1"],
+        ["run", "scans", "-o", "model", "--seed", "5"],  # a run has nothing random
+        ["simulate", "mesh.ply", "-o", "out", "--seed", "-1"],
         ["run", "scans", "-o", "model", "--unit", "foo"],
         ["run", "scans", "-o", "model", "--method", "nonsense"],
         ["run", "scans", "-o", "model", "--holes", "some"],
@@ -355,3 +359,32 @@ def test_the_package_runs_as_a_module_and_leaves_with_its_exit_code():
     assert done.returncode == 1
     assert done.stdout == ""
     assert done.stderr == "scanweld: error: nowhere: there is no such file; check the path\n"
+
+
+def test_a_command_of_a_record_has_the_fields_as_options():
+    @dataclass(frozen=True, kw_only=True)
+    class Inner:
+        small: bool = False
+
+    @dataclass(frozen=True, kw_only=True)
+    class Outer:
+        name: str
+        inner: Inner
+        words: list[str] = field(default_factory=list)
+
+    found: list[Outer] = []
+
+    @takes(Outer)
+    def command(options: Outer) -> None:
+        """What it does."""
+        found.append(options)
+
+    parameters = inspect.signature(command).parameters
+    assert [(each.name, each.default) for each in parameters.values()] == [
+        ("name", inspect.Parameter.empty),
+        ("small", False),
+        ("words", []),
+    ]
+    assert command.__doc__ == "What it does."
+    command(name="a", small=True, words=["b"])
+    assert found == [Outer(name="a", inner=Inner(small=True), words=["b"])]

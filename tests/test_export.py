@@ -390,3 +390,20 @@ def test_bad_poses_are_one_line_and_nothing_is_written(
     assert scanweld("fuse", "scans", "--poses", poses, "-o", "fused", "-q") == 1
     assert says in error_line(capsys)
     assert snapshot() == before
+
+
+@pytest.mark.parametrize("arguments", [["--poses", "mlp"], ["--points", "all.ply"]])
+def test_scans_that_have_changed_since_are_refused(
+    model: Path, arguments: list[str], capsys: pytest.CaptureFixture[str]
+):
+    report = json.loads((model / "report.json").read_text(encoding="utf-8"))
+    for name, entry in report["scans"].items():
+        entry["content_hash"] = read_scan(Path("scans") / f"{name}.ply", name).content_hash()
+    (model / "report.json").write_text(json.dumps(report), encoding="utf-8")
+    assert scanweld("export", model, *arguments, "-o", "same") == 0
+    capsys.readouterr()
+    first, second = [Path("scans") / f"{name}.ply" for name in list(report["scans"])[:2]]
+    first.write_bytes(second.read_bytes())
+    assert scanweld("export", model, *arguments, "-o", "changed") == 1
+    assert f"{first.stem}: is not the scan that model was made of" in error_line(capsys)
+    assert not Path("changed").exists()

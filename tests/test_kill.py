@@ -19,7 +19,7 @@ KILLED = 9
 PROGRAM = """
 import os, sys, threading, time
 from scanweld.app.cache import FileCache
-from scanweld.app.job import run_job
+from scanweld.app.job import Limits, run_job
 from scanweld.config import Config, FusionConfig
 
 scans, output, journal, moment, delay = sys.argv[1:]
@@ -46,7 +46,7 @@ def progress(event):
 
 FileCache.put = put_and_tell
 config = Config(fusion=FusionConfig(max_voxels_across=60))
-run_job([scans], output, config, workers=1, force=True, progress=progress)
+run_job([scans], output, config, limits=Limits(workers=1), force=True, progress=progress)
 print(calls)
 """
 """A run that tells what it finishes, and dies a while after so many steps (never, if it is 0).

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from scanweld.app import job
 from scanweld.app.fuse import fuse_job
-from scanweld.app.job import report_job, run_job
+from scanweld.app.job import Limits, report_job, run_job
 from scanweld.app.memory import (
     MEGABYTE,
     MIN_POINTS,
@@ -192,7 +192,8 @@ def test_large_scans_are_thinned_as_they_are_read_and_the_report_says_so(
     folder = write_scans(tmp_path / "scans", [*small, replace(a_scan(), name="large")])
     config = Config(fusion=FusionConfig(max_voxels_across=60))
     monkeypatch.setattr(job, "points_within", lambda budget, paths: 1200)
-    run_job([folder], tmp_path / "model", config, memory=10_000 * MEGABYTE, workers=1)
+    limits = Limits(memory=10_000 * MEGABYTE, workers=1)
+    run_job([folder], tmp_path / "model", config, limits=limits)
     told = json.loads((tmp_path / "model" / "report.json").read_text(encoding="utf-8"))["scans"]
     assert told["large"]["num_points"] <= 1200
     assert any("thinned from" in note for note in told["large"]["notes"])

@@ -8,12 +8,14 @@ from scanweld.config import Config, PrepareConfig
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge.facts import Knowledge
+from scanweld.pipeline import intake
 from scanweld.pipeline.intake import Intake, take_in
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
-from scanweld.work.progress import NoCache, silent
+from scanweld.work.progress import Event, NoCache, StageAdvanced, silent
 from scanweld.work.stage_log import Stages
 from tests.meshes import joined
 from tests.scenes import small_creature
@@ -108,6 +110,26 @@ def test_a_table_in_most_scans_is_left_out_of_these():
     scans = [seen(small_creature(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
     scans.append(seen(on_table(), 270.0))
     assert not any(scan.is_without_support for scan in taken_in(scans).prepared)
+
+
+def test_only_scans_on_the_table_are_prepared_again_and_progress_counts_each_once(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    scans = [seen(on_table(), azimuth) for azimuth in (0.0, 90.0, 180.0)]
+    scans.append(seen(small_creature(), 270.0))
+    worked: list[str] = []
+
+    def counted(scan: RangeScan, config: PrepareConfig, **options: bool) -> PreparedScan:
+        worked.append(scan.name)
+        return prepare(scan, config, **options)
+
+    monkeypatch.setattr(intake, "prepare", counted)
+    events: list[Event] = []
+    stages = Stages(workers=1, cache=NoCache(), progress=events.append)
+    take_in(scans, {}, Knowledge(), Config(), stages)
+    assert worked == ["at 0", "at 180", "at 270", "at 90", "at 0", "at 180", "at 90"]
+    done = [event.done for event in events if isinstance(event, StageAdvanced)]
+    assert done == [1, 2, 3, 4]
 
 
 def test_the_table_is_kept_where_the_settings_say_so():

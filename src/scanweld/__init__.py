@@ -11,8 +11,6 @@ from scanweld.work import (
 )
 
 # isort: split
-from scanweld.app.comparison import comparison_table
-from scanweld.app.info import describe_scan
 from scanweld.config import Config, load_config
 from scanweld.errors import (
     ConfigError,
@@ -22,6 +20,7 @@ from scanweld.errors import (
     ScanweldError,
     WriteError,
 )
+from scanweld.evaluation.comparison import comparison_table
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.metrics import PoseErrors, evaluate
 from scanweld.evaluation.simulate import simulate
@@ -45,6 +44,7 @@ from scanweld.knowledge.facts import Knowledge, read_knowledge
 from scanweld.pairs.result import PairKind
 from scanweld.pipeline.one_stage import fuse, prepare, refine, register_pair
 from scanweld.pipeline.run import run
+from scanweld.preparation.info import describe_scan
 from scanweld.reconstruction import (
     FactReport,
     FactVerdict,

@@ -9,6 +9,7 @@ from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.slippage import Slide
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
+from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import Viewpoint
 from scanweld.pairs.result import PairKind
 from scanweld.work.stage_log import StageReport
@@ -181,6 +182,7 @@ class Reconstruction:
         stages: Time and memory per stage, in the order of the run.
         config: The resolved settings.
         knowledge: What became of the facts that users gave; empty if they gave none.
+        prepared: The scans that took part, prepared, by name.
     """
 
     poses: Mapping[str, Pose]
@@ -194,3 +196,4 @@ class Reconstruction:
     stages: Mapping[str, StageReport]
     config: Config
     knowledge: tuple[FactReport, ...] = ()
+    prepared: Mapping[str, PreparedScan] = field(default_factory=dict)

@@ -1,66 +1,92 @@
 """A model in the formats of other tools: its poses, its surface and its points."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+import typer
 
 from scanweld.app.model_folder import ModelFolder, open_model
+from scanweld.app.options import MovedScans, UnitOption
 from scanweld.app.workspace import Workspace
-from scanweld.config import Unit
 from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import natural_key, path_from, read_scan, write_whole
+from scanweld.io import natural_key, path_from, write_whole
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.sensor import locate_sensor
 
-MODEL_FORMATS = ("ply", "obj", "stl", "glb")
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
 NO_COLOR = 128
 """Grey of points whose scan has no colours where others have."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+class PoseFormat(StrEnum):
+    """Formats of poses."""
+
+    CONF = "conf"
+    MLP = "mlp"
+    ALN = "aln"
+    TUM = "tum"
+    COLMAP = "colmap"
+    OPEN3D = "open3d"
+    CLOUDCOMPARE = "cloudcompare"
+    NERFSTUDIO = "nerfstudio"
+
+
+class MeshFormat(StrEnum):
+    """Formats of meshes."""
+
+    PLY = "ply"
+    OBJ = "obj"
+    STL = "stl"
+    GLB = "glb"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """What is to be exported.
+    """What is to be exported, from where; also options of the command.
 
     Attributes:
         poses: Names of formats of poses.
-        models: Names of formats of meshes.
+        model: Names of formats of meshes.
         points: Name of a PLY file of all points.
+        scans: The scans, where they are no longer where the model says.
         component: Which component, from 1; only the first has a mesh.
         unit: Of the scans, where the model does not say.
         up: The model's axis that points up, for GLB.
     """
 
-    poses: Sequence[str] = ()
-    models: Sequence[str] = ()
-    points: str | None = None
-    component: int = 1
-    unit: Unit | None = None
-    up: str = "y"
+    poses: Annotated[list[PoseFormat], typer.Option(help="Poses; may be repeated.")] = field(
+        default_factory=list
+    )
+    model: Annotated[list[MeshFormat], typer.Option(help="The mesh; may be repeated.")] = field(
+        default_factory=list
+    )
+    points: Annotated[
+        str | None, typer.Option(metavar="NAME.ply", help="All points, with their scan's number.")
+    ] = None
+    scans: MovedScans = field(default_factory=list)
+    component: Annotated[int, typer.Option(min=1, help="Which component, if several.")] = 1
+    unit: UnitOption = None
+    up: Annotated[Axis, typer.Option(help="The model's axis that points up, for GLB.")] = "y"
 
 
-def export(
-    folder: Path,
-    output: Path,
-    wanted: Wanted,
-    *,
-    scans: Sequence[Path | str] = (),
-    force: bool = False,
-) -> list[str]:
+def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -> list[str]:
     """Write a model in other formats into a folder that appears when it is whole.
 
     Args:
         folder: A model, as ``scanweld run`` or ``fuse`` has made it.
         output: The folder to be made.
         wanted: What to write.
-        scans: The scans, where they are no longer where the model says.
         force: Whether an output that is there already is replaced.
 
     Returns:
@@ -72,7 +98,7 @@ def export(
     """
     model = open_model(folder)
     poses = _component(model, wanted)
-    files = _find_files(model, poses, wanted, scans)
+    files = _find_files(model, poses, wanted)
     parts = [folder / "poses.json", *files.values()]
     with Workspace(output, inputs=parts, force=force) as workspace:
         contents, notes = _render(model, poses, files, wanted, workspace.output)
@@ -86,36 +112,30 @@ def export(
 
 def _component(model: ModelFolder, wanted: Wanted) -> dict[str, Pose]:
     """Poses of the component that is asked for, in natural order; refuses what cannot be."""
-    if not (wanted.poses or wanted.models or wanted.points):
+    if not (wanted.poses or wanted.model or wanted.points):
         raise InputError("nothing to export: ask for --poses, --model or --points")
     points = wanted.points
     if points is not None and (Path(points).name != points or not points.endswith(".ply")):
         raise InputError(f"{points}: points are written as PLY; give a name such as merged.ply")
-    if points in [f"model.{name}" for name in wanted.models]:
+    if points in [f"model.{name}" for name in wanted.model]:
         raise InputError(f"{points}: is the model's name; call the file of points otherwise")
     count = len(model.poses.components)
     if not count:
         raise InputError(f"{model.path}: no scan is placed, so there is nothing to export")
     if wanted.component > count:
         raise InputError(f"{model.path}: has no component {wanted.component}, but {count}")
-    if wanted.models and wanted.component > 1:
+    if wanted.model and wanted.component > 1:
         raise InputError("only the first component has a model; leave out --model or --component")
     names = sorted(model.poses.components[wanted.component - 1], key=natural_key)
     return {name: model.poses.poses[name] for name in names}
 
 
-def _find_files(
-    model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted, scans: Sequence[Path | str]
-) -> dict[str, Path]:
+def _find_files(model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted) -> dict[str, Path]:
     """The scans' files, as far as they are needed."""
     formats = [FORMATS[name] for name in wanted.poses]
-    if not (_reads_scans(wanted) or any(form.needs_files for form in formats)):
-        return {}
-    return model.scan_files(names, scans)
-
-
-def _reads_scans(wanted: Wanted) -> bool:
-    return bool(wanted.points) or any(FORMATS[p].frame is Frame.SENSOR for p in wanted.poses)
+    if wanted.points or any(f.needs_files or f.frame is Frame.SENSOR for f in formats):
+        return model.scan_files(names, wanted.scans)
+    return {}
 
 
 def _render(
@@ -128,16 +148,15 @@ def _render(
     """All files by name, before any of them is written, and notes on them."""
     contents: dict[str, bytes] = {}
     notes: list[str] = []
-    scans: dict[str, RangeScan] = {}
-    if _reads_scans(wanted):
-        scans = {name: read_scan(path, name) for name, path in files.items()}
+    # Formats that only name the files are right for these very scans, too: all are checked.
+    scans = model.read_whole_scans(files)
     for name in dict.fromkeys(wanted.poses):
         sensors = scans if FORMATS[name].frame is Frame.SENSOR else {}
         posed = [_posed(key, pose, files, sensors, output) for key, pose in poses.items()]
         contents |= {key: text.encode() for key, text in FORMATS[name].write(posed).items()}
-    for name in dict.fromkeys(wanted.models):
+    for name in dict.fromkeys(wanted.model):
         contents[f"model.{name}"] = _model(model, name, wanted)
-    if "glb" in wanted.models:
+    if "glb" in wanted.model:
         notes += _glb_notes(model, wanted)
     if wanted.points:
         contents[wanted.points], told = _points(scans, poses)

@@ -69,7 +69,7 @@ def fuse_job(
             result = _fuse(intake, known, found, without, config, stages)
         write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
         with telling(progress, "report"):
-            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()
     return result
 
@@ -113,6 +113,7 @@ def _fuse(
         reasons=_reasons(left_out),
         stages=stages.reports,
         config=config,
+        prepared={scan.name: scan for scan in intake.prepared},
     )
 
 

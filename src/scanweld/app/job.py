@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from scanweld.app.html_report import write_html_report
@@ -24,14 +25,30 @@ from scanweld.work.threads import num_workers
 logger = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Limits:
+    """What a run may take of the machine.
+
+    Attributes:
+        workers: Threads; as many as there are cores if None.
+        memory: Bytes: large scans are thinned for it, and fewer are prepared at a time if need be.
+            Any if None.
+    """
+
+    workers: int | None = None
+    memory: int | None = None
+
+
+NO_LIMITS = Limits()
+
+
 def run_job(
     inputs: Sequence[Path | str],
     output: Path | str,
     config: Config | None = None,
     *,
     knowledge: Knowledge | None = None,
-    workers: int | None = None,
-    memory: int | None = None,
+    limits: Limits = NO_LIMITS,
     force: bool = False,
     progress: Progress = silent,
 ) -> Reconstruction:
@@ -42,9 +59,7 @@ def run_job(
         output: The folder to be made; it appears when it is whole.
         config: Settings; the defaults if not given.
         knowledge: What is known of the scans beforehand.
-        workers: Threads; as many as there are cores if not given.
-        memory: Bytes that the run may take: large scans are thinned for it, and fewer are prepared
-            at a time if need be. Any if None.
+        limits: What the run may take of the machine.
         force: Whether an output that is there already is replaced.
         progress: Told of stages, their finished items, and scans that are refused.
 
@@ -52,7 +67,7 @@ def run_job(
         ScanweldError: If there is too little to work on, or the output cannot be written. Files
             that cannot be read are named in the result instead.
     """
-    files = collect(inputs)
+    files, workers, memory = collect(inputs), limits.workers, limits.memory
     paths = [file.path for file in files]
     with Workspace(Path(output), inputs=paths, force=force) as workspace:
         max_points = None if memory is None else points_within(memory, paths)
@@ -72,7 +87,7 @@ def run_job(
         places = relative_paths(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
         with telling(progress, "report"):
-            write_html_report(workspace.staging, {scan.name: scan for scan in scans})
+            write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())

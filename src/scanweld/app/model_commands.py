@@ -1,6 +1,6 @@
-"""Commands around models and poses: ``fuse`` and ``export``."""
+"""Commands that make a model or start from one: ``run``, ``fuse``, ``report`` and ``export``."""
 
-from enum import StrEnum
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -9,126 +9,179 @@ import typer
 from scanweld.app.export import Wanted
 from scanweld.app.export import export as export_model
 from scanweld.app.fuse import fuse_job
-from scanweld.app.fusion_options import (
-    ComponentOption,
-    FacesOption,
-    HolesOption,
-    SmoothOption,
-    WatertightOption,
-    fusion_settings,
-)
-from scanweld.app.json_lines import finished_line
+from scanweld.app.job import Limits, report_job, run_job
+from scanweld.app.memory import parse_size
+from scanweld.app.named_pairs import named_pairs
 from scanweld.app.options import (
     ConfigFile,
     Force,
     Inputs,
-    Json,
+    MovedScans,
     Output,
-    Quiet,
+    ShowOptions,
+    SurfaceOptions,
     UnitOption,
-    Verbose,
     Workers,
+    takes,
 )
-from scanweld.app.progress import reporting
-from scanweld.app.summary import summary
-from scanweld.config import load_config
+from scanweld.app.workspace import work_folder
+from scanweld.config import Method, load_config
+from scanweld.io import read_poses
+from scanweld.knowledge.facts import Knowledge, read_knowledge
+
+INTERRUPTED = 130
 
 
-class PoseFormatName(StrEnum):
-    """Formats of poses."""
+@dataclass(frozen=True, kw_only=True)
+class FactOptions:
+    """What users know beforehand."""
 
-    CONF = "conf"
-    MLP = "mlp"
-    ALN = "aln"
-    TUM = "tum"
-    COLMAP = "colmap"
-    OPEN3D = "open3d"
-    CLOUDCOMPARE = "cloudcompare"
-    NERFSTUDIO = "nerfstudio"
+    knowledge: Annotated[
+        Path | None, typer.Option("--knowledge", help="The five that follow, as a JSON file.")
+    ] = None
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="The frame of this scan is the world. Can be repeated."),
+    ] = None
+    start: Annotated[
+        Path | None,
+        typer.Option(help="Poses to be tried besides, a poses.json; never just believed."),
+    ] = None
+    together: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="A B", help="Two scans see some of the same surface. Can be repeated."
+        ),
+    ] = None
+    apart: Annotated[
+        list[str] | None,
+        typer.Option(metavar="A B", help="Two scans must not be laid together. Can be repeated."),
+    ] = None
+    turntable: Annotated[
+        bool, typer.Option("--turntable", help="All scans turn about one, unknown axis.")
+    ] = False
 
-
-class ModelFormatName(StrEnum):
-    """Formats of meshes."""
-
-    PLY = "ply"
-    OBJ = "obj"
-    STL = "stl"
-    GLB = "glb"
-
-
-class UpAxis(StrEnum):
-    """Axes that may point up."""
-
-    X = "x"
-    Y = "y"
-    Z = "z"
-    MINUS_X = "-x"
-    MINUS_Y = "-y"
-    MINUS_Z = "-z"
-
-
-PosesFile = Annotated[
-    Path, typer.Option("--poses", help="Poses of the scans, in any format that export writes.")
-]
-
-
-def fuse(
-    inputs: Inputs,
-    poses: PosesFile,
-    output: Output,
-    config: ConfigFile = None,
-    workers: Workers = None,
-    unit: UnitOption = None,
-    holes: HolesOption = None,
-    component: ComponentOption = None,
-    watertight: WatertightOption = False,
-    smooth: SmoothOption = None,
-    faces: FacesOption = None,
-    force: Force = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> None:
-    """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
-    settings = load_config(
-        config,
-        unit=None if unit is None else unit.value,
-        fusion=fusion_settings(holes, component, watertight, smooth, faces),
-    )
-    with reporting(quiet=quiet, verbose=verbose, as_json=as_json) as progress:
-        result = fuse_job(
-            inputs, poses, output, settings, workers=workers, force=force, progress=progress
+    def known(self) -> Knowledge:
+        """The facts of the options and of the file."""
+        told = Knowledge(
+            fix=tuple(self.fix or ()),
+            start=None if self.start is None else read_poses(self.start),
+            together=named_pairs("--together", self.together),
+            apart=named_pairs("--apart", self.apart),
+            turntable=self.turntable,
         )
-    typer.echo(finished_line(result, output) if as_json else summary(result, output))
-    raise typer.Exit(result.verdict.exit_code)
+        return told if self.knowledge is None else read_knowledge(self.knowledge).joined(told)
 
 
-def export(
-    model_dir: Annotated[Path, typer.Argument(help="A folder that run or fuse has made.")],
-    output: Output,
-    poses: Annotated[list[PoseFormatName], typer.Option(help="Poses; may be repeated.")] = [],  # noqa: B006
-    model: Annotated[list[ModelFormatName], typer.Option(help="The mesh; may be repeated.")] = [],  # noqa: B006
-    points: Annotated[
-        str | None, typer.Option(metavar="NAME.ply", help="All points, with their scan's number.")
-    ] = None,
-    scans: Annotated[
-        list[str], typer.Option(help="The scans, if they have been moved since.")
-    ] = [],  # noqa: B006
-    component: Annotated[int, typer.Option(min=1, help="Which component, if several.")] = 1,
-    unit: UnitOption = None,
-    up: Annotated[UpAxis, typer.Option(help="The model's axis that points up, for GLB.")] = (
-        UpAxis.Y
-    ),
-    force: Force = False,
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What ``run`` takes."""
+
+    inputs: Inputs
+    output: Output
+    config: ConfigFile = None
+    workers: Workers = None
+    memory: Annotated[
+        str | None,
+        typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
+    ] = None
+    unit: UnitOption = None
+    method: Annotated[
+        Method | None, typer.Option(help="robust (the default), or paper: as published.")
+    ] = None
+    facts: FactOptions
+    with_doubtful: Annotated[
+        bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
+    ] = False
+    surface: SurfaceOptions
+    force: Force = False
+    show: ShowOptions
+
+
+@takes(RunOptions)
+def run(options: RunOptions) -> None:
+    """Register and fuse scans: poses, a model and a verdict."""
+    output, memory = options.output, options.memory
+    fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
+    settings = load_config(options.config, unit=options.unit, method=options.method, fusion=fusion)
+    known = options.facts.known()
+    try:
+        with options.show.reporting() as progress:
+            size = None if memory is None else parse_size(memory)
+            limits = Limits(workers=options.workers, memory=size)
+            result = run_job(
+                options.inputs,
+                output,
+                settings,
+                knowledge=known,
+                limits=limits,
+                force=options.force,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        kept = work_folder(output)
+        remark = f"the same command goes on from {kept}" if kept.exists() else "nothing was written"
+        typer.echo(f"scanweld: interrupted; {remark}", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+    options.show.finish(result, output)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FuseOptions:
+    """What ``fuse`` takes."""
+
+    inputs: Inputs
+    poses: Annotated[
+        Path, typer.Option(help="Poses of the scans, in any format that export writes.")
+    ]
+    output: Output
+    config: ConfigFile = None
+    workers: Workers = None
+    unit: UnitOption = None
+    surface: SurfaceOptions
+    force: Force = False
+    show: ShowOptions
+
+
+@takes(FuseOptions)
+def fuse(options: FuseOptions) -> None:
+    """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
+    settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
+    with options.show.reporting() as progress:
+        result = fuse_job(
+            options.inputs,
+            options.poses,
+            options.output,
+            settings,
+            workers=options.workers,
+            force=options.force,
+            progress=progress,
+        )
+    options.show.finish(result, options.output)
+
+
+def report(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL", help="Folder that run or fuse has made.")
+    ],
+    scans: MovedScans = [],  # noqa: B006
 ) -> None:
+    """Write report.html of a finished model folder anew."""
+    typer.echo(report_job(model, scans))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """What ``export`` takes."""
+
+    model_dir: Annotated[Path, typer.Argument(help="A folder that run or fuse has made.")]
+    output: Output
+    wanted: Wanted
+    force: Force = False
+
+
+@takes(ExportOptions)
+def export(options: ExportOptions) -> None:
     """Write a model, its poses and points in the formats of other tools."""
-    wanted = Wanted(
-        poses=[form.value for form in poses],
-        models=[form.value for form in model],
-        points=points,
-        component=component,
-        unit=None if unit is None else unit.value,
-        up=up.value,
-    )
-    lines = export_model(model_dir, output, wanted, scans=scans, force=force)
+    lines = export_model(options.model_dir, options.output, options.wanted, force=options.force)
     typer.echo("\n".join(lines))

@@ -20,9 +20,10 @@ class Entry(BaseModel):
 
 
 class FileEntry(Entry):
-    """Where a scan's file is, as seen from the folder."""
+    """Where a scan's file is, as seen from the folder, and the hash of the scan's content."""
 
     file: str | None = None
+    content_hash: str | None = None
 
 
 class Files(Entry):

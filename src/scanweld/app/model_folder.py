@@ -13,7 +13,7 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.thinning import thinned
-from scanweld.reconstruction import ScanVerdict
+from scanweld.reconstruction import Reconstruction, ScanVerdict
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,10 +23,12 @@ class ModelFolder:
     Attributes:
         path: Of the folder.
         poses: Poses of the scans, and its components.
+        result: What the folder was written from, if that is at hand: then the mesh is not read.
     """
 
     path: Path
     poses: PoseSet
+    result: Reconstruction | None = None
 
     @property
     def mesh_path(self) -> Path:
@@ -40,6 +42,8 @@ class ModelFolder:
         Raises:
             ReadError: If it is broken, or has no faces.
         """
+        if self.result is not None:
+            return self.result.mesh
         return read_mesh(self.mesh_path) if self.mesh_path.is_file() else None
 
     @cached_property
@@ -109,13 +113,33 @@ class ModelFolder:
             files: As ``scan_files`` finds them, by the scans' names.
 
         Raises:
+            InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        most = self._files.max_points
-        return {
-            name: read_scan(path, name) if most is None else thinned(read_scan(path, name), most)
-            for name, path in files.items()
-        }
+        return {name: self._as_taken(read_scan(path, name)) for name, path in files.items()}
+
+    def read_whole_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+        """The same with all of their points.
+
+        Raises:
+            InputError: If one of them is not what the model was made of.
+            ReadError: If one of them, or the report, is broken.
+        """
+        scans = {name: read_scan(path, name) for name, path in files.items()}
+        for scan in scans.values():
+            self._as_taken(scan)
+        return scans
+
+    def _as_taken(self, scan: RangeScan) -> RangeScan:
+        """A scan as the model's maker took it, after making sure that it is the same one."""
+        most, told = self._files.max_points, self._files.scans.get(scan.name)
+        taken = scan if most is None else thinned(scan, most)
+        if told is not None and told.content_hash not in (None, taken.content_hash()):
+            raise InputError(
+                f"{printed(scan.name)}: is not the scan that {self.path} was made of; give the "
+                "same files"
+            )
+        return taken
 
     @cached_property
     def _files(self) -> Files:
@@ -127,8 +151,12 @@ class ModelFolder:
         return {name: self.path / scan.file for name, scan in scans.items() if scan.file}
 
 
-def open_model(path: Path) -> ModelFolder:
+def open_model(path: Path, result: Reconstruction | None = None) -> ModelFolder:
     """Open a model's folder.
+
+    Args:
+        path: Of the folder.
+        result: What it was written from, if that is at hand.
 
     Raises:
         ReadError: If it is no such folder, or its poses are broken.
@@ -137,4 +165,4 @@ def open_model(path: Path) -> ModelFolder:
         raise ReadError(
             f"{path}: holds no poses.json; name a folder that scanweld run or fuse has made"
         )
-    return ModelFolder(path=path, poses=read_poses(path / "poses.json"))
+    return ModelFolder(path=path, poses=read_poses(path / "poses.json"), result=result)

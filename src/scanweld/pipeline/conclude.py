@@ -78,6 +78,7 @@ def conclude(
         stages=stages,
         config=config,
         knowledge=facts,
+        prepared={scan.name: scan for scan in prepared},
     )
 
 

@@ -1,6 +1,6 @@
 """What comes in: scans prepared, sorted by content, those that cannot take part, what is known."""
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from scanweld.knowledge.facts import Knowledge
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
+from scanweld.work.threads import map_in_order
 
 Refuse = Callable[[str, str], None]
 """Called with a scan's name and the reason why it cannot take part."""
@@ -77,21 +78,20 @@ def take_in(
             refused[name] = reason
             stages.progress(ScanRefused(scan=name, reason=reason))
 
-    def prepare_each(standing: Container[str] = ()) -> list[PreparedScan]:
-        outcomes = stages.each(
-            "prepare",
-            lambda scan: _try_prepare(scan, config, scan.name in standing),
-            kept,
-            then=lambda scan, found: refuse(scan.name, found) if isinstance(found, str) else None,
-        )
-        return [found for found in outcomes if not isinstance(found, str)]
+    def take(scan: RangeScan, outcome: PreparedScan | str) -> None:
+        if isinstance(outcome, str):
+            refuse(scan.name, outcome)
+            taken.pop(scan.name, None)
+        else:
+            taken[scan.name] = outcome
 
+    taken: dict[str, PreparedScan] = {}
     with stages.stage("prepare") as counts:
         kept = _of_one_size(_without_duplicates(scans, refuse), refuse)
-        prepared = prepare_each()
-        standing = {scan.name for scan in prepared if stands_on_support(scan)}
-        if config.prepare.support == "left out" and len(standing) >= MOST * len(prepared):
-            prepared = prepare_each(standing)
+        stages.each("prepare", lambda scan: _try_prepare(scan, config), kept, then=take)
+        for scan, outcome in _without_support(kept, taken, config, stages.workers):
+            take(scan, outcome)
+        prepared = list(taken.values())
         counts["scans"] = len(prepared)
         counts["refused"] = len(refused)
     if len(prepared) < 2:
@@ -143,6 +143,20 @@ def _unit_hint(ratio: float) -> str:
     if abs(np.log(ratio / closest)) > np.log(2.0):
         return "; is it of the same object?"
     return f"; units mixed up ({UNIT_RATIOS[closest]})? Give all scans in one unit"
+
+
+def _without_support(
+    scans: Sequence[RangeScan], taken: Mapping[str, PreparedScan], config: Config, workers: int
+) -> list[tuple[RangeScan, PreparedScan | str]]:
+    """Scans that stand on a table, prepared again without it, if it is to go and most show one."""
+    if config.prepare.support != "left out":
+        return []
+    standing = {name for name, scan in taken.items() if stands_on_support(scan)}
+    if not standing or len(standing) < MOST * len(taken):
+        return []
+    again = [scan for scan in scans if scan.name in standing]
+    outcomes = map_in_order(lambda scan: _try_prepare(scan, config, True), again, workers)
+    return list(zip(again, outcomes, strict=True))
 
 
 def _try_prepare(

@@ -151,7 +151,7 @@ def payload(
     if scene.points is not None and scene.point_normals is not None:
         arrays["pointPosition"] = quantised(scene.points, box)
         arrays["pointNormal"] = directions(scene.point_normals)
-        arrays["pointScan"] = np.asarray(scene.point_scan).astype(np.uint8)
+        arrays["pointScan"] = np.asarray(scene.point_scan).astype(np.uint16)
     index, text = packed(arrays)
     description = {
         "arrays": index,

@@ -6,7 +6,6 @@ import numpy as np
 
 from scanweld.app.model_folder import ModelFolder
 from scanweld.config import PrepareConfig
-from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
@@ -23,9 +22,6 @@ class Sources:
         model: The folder.
         scans: The scans by name; more than those that are placed does no harm.
         config: How scans are prepared.
-
-    Raises:
-        InputError: If a placed scan is missing, or is not what the model was made of.
     """
 
     def __init__(
@@ -35,17 +31,8 @@ class Sources:
         self._entries = model.report.scans
         self._fused = model.fused_scans
         self._config = config
-        self._prepared: dict[str, PreparedScan] = {}
-        names = sorted(model.poses.poses, key=natural_key)
-        for name in names:
-            known = self._entries[name].content_hash
-            if name not in scans:
-                raise InputError(f"{name}: has a pose but is not among the scans given; add it")
-            if known is not None and scans[name].content_hash() != known:
-                raise InputError(
-                    f"{name}: is not the scan that {model.path} was made of; give the same files"
-                )
-        self._scans = {name: scans[name] for name in names}
+        self._scans = scans
+        self._prepared = {} if model.result is None else dict(model.result.prepared)
 
     def points_of_model(self) -> dict[str, FloatArray]:
         """Points (N, 3) of each scan that the model was made of, in its frame."""
@@ -59,7 +46,8 @@ class Sources:
     def world_from_reference_sensor(self) -> Pose:
         """Where the sensor of the largest component's reference scan stood."""
         name = self._poses.components[0][0]
-        return self.world_from_scan(name) @ locate_sensor(self._scans[name]).sensor_pose
+        scan = self._prepared[name].scan if name in self._prepared else self._scans[name]
+        return self.world_from_scan(name) @ locate_sensor(scan).sensor_pose
 
     def prepared(self, name: str) -> PreparedScan:
         """A scan as the run prepared it."""

@@ -13,26 +13,33 @@ from scanweld.config import Config
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import write_whole
+from scanweld.reconstruction import Reconstruction
 
 logger = logging.getLogger(__name__)
 
 
-def write_html_report(folder: Path, scans: Mapping[str, RangeScan] | None = None) -> Path:
+def write_html_report(
+    folder: Path,
+    scans: Mapping[str, RangeScan] | None = None,
+    result: Reconstruction | None = None,
+) -> Path:
     """Write report.html beside the files that a run wrote: the same files give the same bytes.
 
     Args:
         folder: The model folder.
-        scans: The scans by name. Without them the page has no residuals, support and contours.
+        scans: The scans by name, as the model was made of. Without them the page has no residuals,
+            support and contours.
+        result: What the folder was written from, if that is at hand: then the model is not read
+            and no scan is prepared again. The page is the same.
 
     Returns:
         Path of the page.
 
     Raises:
         ReadError: If a part of the folder is missing or broken.
-        InputError: If a placed scan is missing, or is not what the model was made of.
         WriteError: If the page cannot be written.
     """
-    model = open_model(folder)
+    model = open_model(folder, result)
     _check_whole(model)
     config = _settings(model)
     sources = None

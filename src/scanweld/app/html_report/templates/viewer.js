@@ -144,12 +144,12 @@ class Viewer {
       arrays.value && [arrays.value, 2, gl.UNSIGNED_BYTE, false, 4]], faces);
     this.borders = vertexArray(gl, [position], borders);
     this.points = this.counts.points && vertexArray(gl, [[arrays.pointPosition, 3, gl.UNSIGNED_SHORT, true, 6],
-      [arrays.pointNormal, 3, gl.BYTE, true, 4], null, null, [arrays.pointScan, 1, gl.UNSIGNED_BYTE, false, 1]]);
+      [arrays.pointNormal, 3, gl.BYTE, true, 4], null, null, [arrays.pointScan, 1, gl.UNSIGNED_SHORT, false, 2]]);
   }
 
   uploadScans() {
     const gl = this.gl;
-    this.shown = new Uint8Array(4 * 256);
+    this.shown = new Uint8Array(4 * Math.max(1, this.scene.scanColors.length));
     this.scene.scanColors.forEach((color, k) => this.shown.set([...color, 255], 4 * k));
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
@@ -159,7 +159,7 @@ class Viewer {
 
   sendScans() {
     const gl = this.gl;
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, this.shown);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, this.shown.length / 4, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, this.shown);
     this.request();
   }
 
