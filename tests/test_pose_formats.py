@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scanweld.app.model_commands import PoseFormatName
+from scanweld.app.options import PoseFormat
 from scanweld.errors import InputError, ReadError, ScanweldError, WriteError
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
@@ -373,4 +373,4 @@ def test_nothing_to_read_is_an_error(tmp_path: Path, name: str):
 
 
 def test_the_command_offers_every_format():
-    assert [form.value for form in PoseFormatName] == list(FORMATS)
+    assert [form.value for form in PoseFormat] == list(FORMATS)

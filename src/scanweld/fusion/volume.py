@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import InputError
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import plane_distance, project, smooth_distance

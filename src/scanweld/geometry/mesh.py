@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
 
@@ -115,6 +113,9 @@ def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
 
 def pieces(faces: IntArray, num_vertices: int) -> IntArray:
     """The connected piece (V,) of each vertex, from 0; one without a face is a piece by itself."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     edges = coo_array(
         (np.ones(len(start), dtype=bool), (start, end)), shape=(num_vertices, num_vertices)

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.io.raw import RawScan, fan_triangles, to_bytes

@@ -4,9 +4,9 @@ import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, IntArray
 from scanweld.io.ply_header import PlyElement, PlyHeader, PlyProperty

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 

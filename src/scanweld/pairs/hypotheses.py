@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.visibility import (

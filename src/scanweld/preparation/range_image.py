@@ -1,7 +1,6 @@
 """A scan as a range image at the working resolution, whatever its file looked like."""
 
 import numpy as np
-from scipy import ndimage
 
 from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -241,6 +240,8 @@ def _piece_sizes(mesh: TriangleMesh) -> IntArray:
 
 def rim_pixels(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
     """Pixels (H, W) of a surface's border, and the next ones up to a width of so many."""
+    from scipy import ndimage
+
     has = np.isfinite(depth)
     border = np.zeros(depth.shape, dtype=bool)
     has_face = np.zeros(len(mesh.vertices), dtype=bool)

@@ -1,7 +1,6 @@
 """Stray points: outliers and flying pixels, which are not part of any surface."""
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.scan import RangeScan
@@ -28,6 +27,8 @@ def without_strays(scan: RangeScan, points: FloatArray, spacing: float) -> Range
 
 
 def _has_neighbours(points: FloatArray, reach: float) -> BoolArray:
+    from scipy.spatial import KDTree
+
     # The nearest of all is the point itself.
     distance, _ = KDTree(points).query(points, k=MIN_NEIGHBOURS + 1, distance_upper_bound=reach)
     return np.isfinite(distance[:, -1])
