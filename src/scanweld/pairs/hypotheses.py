@@ -8,9 +8,9 @@ soon as they speak clearly against it. The scores rank; what is kept is judged a
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
 from scanweld.evidence.field import (
     RASTER_DEPTH,

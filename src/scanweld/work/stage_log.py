@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from scanweld.compiled.source import code_digest
 from scanweld.config import Section
 from scanweld.work.progress import Cache, Progress, StageAdvanced, telling
-from scanweld.work.source import code_digest
 from scanweld.work.threads import map_in_order
 
 try:
