@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from scanweld.app.cache import NAME as CACHE_NAME
+from scanweld.app.cache import CacheSize, FileCache, cache_folder
 from scanweld.app.export import Wanted
 from scanweld.app.export import export as export_model
 from scanweld.app.fuse import fuse_job
@@ -24,7 +26,6 @@ from scanweld.app.options import (
     Workers,
     takes,
 )
-from scanweld.app.workspace import work_folder
 from scanweld.config import Method, load_config
 from scanweld.io import read_poses
 from scanweld.knowledge.facts import Knowledge, read_knowledge
@@ -85,6 +86,14 @@ class RunOptions:
         str | None,
         typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
     ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A dask cluster to work on, as tcp://host:8786."),
+    ] = None
+    no_cache: Annotated[
+        bool,
+        typer.Option("--no-cache", help="Neither keep finished work beside the output nor use it."),
+    ] = False
     unit: UnitOption = None
     method: Annotated[
         Method | None, typer.Option(help="robust (the default), or paper: as published.")
@@ -108,7 +117,12 @@ def run(options: RunOptions) -> None:
     try:
         with options.show.reporting() as progress:
             size = None if memory is None else parse_size(memory)
-            limits = Limits(workers=options.workers, memory=size)
+            limits = Limits(
+                workers=options.workers,
+                memory=size,
+                keeps=not options.no_cache,
+                scheduler=options.scheduler,
+            )
             result = run_job(
                 options.inputs,
                 output,
@@ -119,8 +133,9 @@ def run(options: RunOptions) -> None:
                 progress=progress,
             )
     except KeyboardInterrupt:
-        kept = work_folder(output)
-        remark = f"the same command goes on from {kept}" if kept.exists() else "nothing was written"
+        kept = cache_folder(output)
+        goes_on = kept.exists() and not options.no_cache
+        remark = f"the same command goes on from {kept}" if goes_on else "nothing was written"
         typer.echo(f"scanweld: interrupted; {remark}", err=True)
         raise typer.Exit(INTERRUPTED) from None
     options.show.finish(result, output)
@@ -185,3 +200,26 @@ def export(options: ExportOptions) -> None:
     """Write a model, its poses and points in the formats of other tools."""
     lines = export_model(options.model_dir, options.output, options.wanted, force=options.force)
     typer.echo("\n".join(lines))
+
+
+cache = typer.Typer(
+    help="Finished work that runs keep beside their outputs.", rich_markup_mode=None
+)
+Place = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Where models were made.")]
+
+
+@cache.command("info")
+def cache_info(folder: Place = Path()) -> None:
+    """Show how much is kept."""
+    typer.echo(_told(folder, FileCache(folder / CACHE_NAME).size(), "kept"))
+
+
+@cache.command("clear")
+def cache_clear(folder: Place = Path()) -> None:
+    """Remove all that is kept: nothing but time is lost."""
+    typer.echo(_told(folder, FileCache(folder / CACHE_NAME).clear(), "removed"))
+
+
+def _told(folder: Path, size: CacheSize, what: str) -> str:
+    megabytes = size.bytes / 1e6
+    return f"{folder / CACHE_NAME}: {size.records} records {what}, {megabytes:.1f} MB"
