@@ -7,6 +7,7 @@ stands in the scheduler's graph: where a worker dies, the others do again what w
 
 import asyncio
 import importlib
+import logging
 import platform
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -46,11 +47,15 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         try:
-            distributed = importlib.import_module("distributed")
+            dask, distributed = map(importlib.import_module, ("dask", "distributed"))
         except ImportError as error:
             raise InputError(
                 "a cluster takes dask.distributed: pip install 'scanweld[cluster]'"
             ) from error
+        # The parts are in the graph, which dask warns of; why they are, stands above.
+        dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"})
+        # Its client would print a page where the scheduler is lost, which we say in a line.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._address = address
         self._lost = (OSError, asyncio.CancelledError, distributed.client.FutureCancelledError)
         self._killed: type[Exception] = distributed.KilledWorker
@@ -101,8 +106,8 @@ class Cluster:
                 yield left.popleft().result()
         except self._lost as error:
             raise InputError(
-                f"{self._address}: the scheduler was lost ({_in_brief(error)}); run again, and "
-                "what is finished is not done again"
+                f"{self._address}: the scheduler was lost; run again, and what is finished is not "
+                "done again"
             ) from error
         except self._killed as error:
             raise InputError(
