@@ -27,13 +27,11 @@ from benchmarks.results import Json, write_results
 from benchmarks.scores import Stated
 from benchmarks.sets import OBJECTS, PairSet, data_folder, made_pairs, moved_scans, real_pairs
 from scanweld.config import Config, PairsConfig
-from scanweld.contours.coherence import contour_matcher
 from scanweld.evaluation.metrics import MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT, object_diameter
-from scanweld.evidence.field import make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.heat.features import Features, describe
-from scanweld.pairs.registrar import PairRegistrar
+from scanweld.heat.features import describe
+from scanweld.pairs.registrar import PairRegistrar, PairScan, PairTask
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
@@ -87,20 +85,19 @@ def answers_of(scans: PairSet, seed: int, anchors: str, workers: int) -> list[Js
         )
         # As a run does: the method's own way to register two scans, by index.
         prepared = list(map_in_order(lambda scan: prepare(scan, config.prepare), moved, workers))
-        fields = list(map_in_order(make_field, prepared, workers))
-        features: dict[int, Features] = {}
-        if anchors != "even":
-            described = map_in_order(lambda p: describe(p, config.heat), prepared, workers)
-            features = dict(enumerate(described))
-        contours = contour_matcher(prepared, config.contours)
-        registrar = PairRegistrar(scans=prepared, fields=fields, contours=contours, config=config)
+        registrar = PairRegistrar(config=config)
+
+        def described(scan: PreparedScan) -> PairScan:
+            return registrar.scan(scan, None if anchors == "even" else describe(scan, config.heat))
+
+        parts = list(map_in_order(described, prepared, workers))
         diameter = object_diameter(moved, truth)
 
         def answer(edge: tuple[str, str]) -> Json:
             at_i, at_j = (k for k, scan in enumerate(prepared) if scan.name in edge)
             i, j = prepared[at_i], prepared[at_j]
             start = time.perf_counter()
-            result = registrar.register((at_i, at_j), features)
+            result = registrar.register(PairTask(edge=(at_i, at_j)), parts[at_i], parts[at_j])
             seconds = time.perf_counter() - start
             true = truth[i.name].inverse() @ truth[j.name]
             errors = [_error(i, j, each.i_from_j, true) for each in result.alternatives]

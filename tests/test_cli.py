@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from scanweld.app import job
+from scanweld.app.cache import cache_folder
 from scanweld.app.cli import main
 from scanweld.app.options import takes
 from scanweld.app.workspace import work_folder
@@ -293,10 +294,21 @@ def test_interruption_exits_with_130_and_a_rerun_continues(
     err = capsys.readouterr().err
     assert err.startswith("scanweld: interrupted; the same command goes on from ")
     assert len(err.splitlines()) == 1
-    assert not Path("model").exists() and work_folder(Path("model")).exists()
+    assert not Path("model").exists() and cache_folder(Path("model")).exists()
     monkeypatch.setattr(job.pipeline, "run", stub_run)
     assert scanweld("run", scans, "-o", "model") == 0
     assert not work_folder(Path("model")).exists()
+
+
+def test_without_a_cache_nothing_is_kept(
+    scans: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    assert scanweld("run", scans, "-o", "model", "--no-cache", "-q") == 0
+    assert not cache_folder(Path("model")).exists()
+    capsys.readouterr()
+    fail_with(KeyboardInterrupt(), monkeypatch)
+    assert scanweld("run", scans, "-o", "other", "--no-cache", "-q") == 130
+    assert capsys.readouterr().err == "scanweld: interrupted; nothing was written\n"
 
 
 def test_info_shows_what_was_read_and_names_the_broken_file(

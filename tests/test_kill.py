@@ -77,14 +77,14 @@ def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same
 ):
     """Moments are spread over all of a run; each goes on from what the one before it left."""
     scans = write_scans(tmp_path / "scans", creature_scene(4, pixels=60.0).scans)
-    undisturbed, journal = tmp_path / "undisturbed", tmp_path / "journal"
+    undisturbed, journal = tmp_path / "apart" / "undisturbed", tmp_path / "journal"
     whole = run(scans, undisturbed, journal)
     assert whole.returncode == 0, whole.stderr
     num_steps, finished = int(whole.stdout), journal.read_text(encoding="utf-8").split()
     journal.unlink()
 
-    output = tmp_path / "model"
-    output.mkdir()
+    output = tmp_path / "here" / "model"
+    output.mkdir(parents=True)
     old = {"mine.txt": b"old", "poses.json": b"{}"}
     for name, content in old.items():
         (output / name).write_bytes(content)

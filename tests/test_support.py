@@ -14,7 +14,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge.facts import Knowledge
-from scanweld.pipeline import intake
+from scanweld.pipeline import preparations
 from scanweld.pipeline.intake import take_in
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
@@ -109,7 +109,7 @@ def test_only_scans_on_the_table_are_prepared_again_and_progress_counts_each_onc
         worked.append(scan.name)
         return prepare(scan, config, **options)
 
-    monkeypatch.setattr(intake, "prepare", counted)
+    monkeypatch.setattr(preparations, "prepare", counted)
     events: list[Event] = []
     stages = Stages(workers=1, cache=NoCache(), progress=events.append)
     take_in(scans, {}, Knowledge(), Config(), stages)

@@ -1,22 +1,14 @@
 """The output folder is whole or not there, and an earlier one survives whatever happens."""
 
-import hashlib
-import io
-import pickle
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from scanweld.app.cache import FileCache
 from scanweld.app.workspace import Workspace, work_folder
 from scanweld.errors import InputError, WriteError
-from scanweld.geometry.pose import Pose
-from scanweld.geometry.scan import RangeScan
-from scanweld.work.records import Records
 
 
 @pytest.fixture
@@ -46,7 +38,6 @@ def left_over(folder: Path) -> list[str]:
 
 def test_output_appears_when_whole_and_the_workspace_goes(output: Path):
     with Workspace(output) as workspace:
-        workspace.cache.put("ab", 1)
         assert not output.exists()
         finish(workspace)
     assert content(output) == {"poses.json": "new"}
@@ -74,27 +65,18 @@ def test_force_replaces_an_old_output(old_output: Path):
     assert left_over(old_output) == ["model"]
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_interruption_keeps_old_output_and_finished_work(
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError, InputError])
+def test_failure_keeps_the_old_output_and_leaves_nothing_else(
     old_output: Path, error: type[BaseException]
 ):
     with pytest.raises(error), Workspace(old_output, force=True) as workspace:
-        workspace.cache.put("ab", "finished")
         (workspace.staging / "poses.json").write_text("half")
         raise error
     assert content(old_output) == {"poses.json": "old"}
-    with Workspace(old_output, force=True) as workspace:
-        assert workspace.cache.get("ab") == "finished"
-        assert not list(workspace.staging.iterdir())
-        finish(workspace)
-    assert content(old_output) == {"poses.json": "new"}
     assert left_over(old_output) == ["model"]
-
-
-def test_interruption_before_anything_is_finished_leaves_nothing(output: Path):
-    with pytest.raises(KeyboardInterrupt), Workspace(output):
-        raise KeyboardInterrupt
-    assert left_over(output) == []
+    with pytest.raises(error), Workspace(old_output / "deep" / "down"):
+        raise error
+    assert content(old_output) == {"poses.json": "old"}
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
@@ -110,11 +92,10 @@ def test_failure_between_the_two_moves_brings_the_old_output_back(
 
     workspace = Workspace(old_output, force=True)
     with pytest.raises((KeyboardInterrupt, WriteError)), workspace:
-        workspace.cache.put("ab", "finished")
         monkeypatch.setattr(Path, "rename", fails_for_the_new)
         finish(workspace)
     assert content(old_output) == {"poses.json": "old"}
-    assert workspace.cache.get("ab") == "finished"
+    assert left_over(old_output) == ["model"]
 
 
 def test_old_output_comes_back_after_a_kill_between_the_two_moves(old_output: Path):
@@ -142,46 +123,30 @@ def test_old_output_goes_after_a_kill_before_it_was_deleted(old_output: Path):
 def test_output_that_somebody_filled_meanwhile_stays(output: Path):
     workspace = Workspace(output)
     with pytest.raises(WriteError, match="cannot be moved"), workspace:
-        workspace.cache.put("ab", "finished")
         output.mkdir()
         (output / "theirs").write_text("theirs")
         finish(workspace)
     assert content(output) == {"theirs": "theirs"}
-    assert workspace.cache.get("ab") == "finished"
 
 
-def test_bad_input_leaves_nothing(output: Path):
-    with pytest.raises(InputError), Workspace(output / "deep" / "down") as workspace:
-        workspace.cache.put("ab", 1)
-        raise InputError("too little")
-    assert left_over(output) == []
-
-
-def test_bad_input_keeps_what_an_earlier_run_finished(output: Path):
-    for error in (KeyboardInterrupt, InputError):
-        with pytest.raises(error), Workspace(output) as workspace:
-            workspace.cache.put("ab", 1)
-            raise error
-    with Workspace(output) as workspace:
-        assert workspace.cache.get("ab") == 1
-
-
-def test_failure_to_open_keeps_what_an_earlier_run_finished(
-    output: Path, monkeypatch: pytest.MonkeyPatch
+def test_failure_to_open_keeps_an_old_output_that_is_aside(
+    old_output: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    with pytest.raises(KeyboardInterrupt), Workspace(output) as workspace:
-        workspace.cache.put("ab", 1)
-        raise KeyboardInterrupt
+    aside = work_folder(old_output) / "old"
+    aside.parent.mkdir()
+    old_output.rename(aside)
 
     def is_full(self: Path, *_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    with monkeypatch.context() as context:
-        context.setattr(Path, "mkdir", is_full)
-        with pytest.raises(WriteError, match="No space left"):
-            Workspace(output).__enter__()
-    with Workspace(output) as workspace:
-        assert workspace.cache.get("ab") == 1
+    for step in ("rename", "mkdir"):
+        with monkeypatch.context() as context:
+            context.setattr(Path, step, is_full)
+            with pytest.raises(WriteError, match="No space left"):
+                Workspace(old_output).__enter__()
+    with pytest.raises(WriteError, match="not empty"), Workspace(old_output):
+        pytest.fail("work began")
+    assert content(old_output) == {"poses.json": "old"}
 
 
 def test_second_run_on_the_same_output_is_refused(output: Path):
@@ -192,19 +157,17 @@ def test_second_run_on_the_same_output_is_refused(output: Path):
     assert content(output) == {"poses.json": "new"}
 
 
-def test_lock_and_work_of_a_killed_run_are_taken_over(output: Path):
+def test_lock_of_a_killed_run_is_taken_over(output: Path):
     program = (
         "import os, signal, sys; from pathlib import Path\n"
         "from scanweld.app.workspace import Workspace\n"
         "with Workspace(Path(sys.argv[1])) as workspace:\n"
-        "    workspace.cache.put('ab', 'finished')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     killed = subprocess.run([sys.executable, "-c", program, output], check=False)
     assert killed.returncode == -signal.SIGKILL
     assert (work_folder(output) / "lock").exists()
     with Workspace(output) as workspace:
-        assert workspace.cache.get("ab") == "finished"
         finish(workspace)
     assert left_over(output) == ["model"]
 
@@ -250,57 +213,3 @@ def test_output_behind_a_link_is_replaced_and_the_link_stays(old_output: Path):
     with Workspace(link, force=True) as workspace:
         finish(workspace)
     assert link.is_symlink() and content(old_output) == {"poses.json": "new"}
-
-
-def test_cached_scan_comes_back_equal_and_frozen(tmp_path: Path):
-    scan = RangeScan(name="a", points=np.arange(12.0).reshape(4, 3))
-    cache = FileCache(tmp_path, Records(RangeScan))
-    assert cache.get("ab") is None and cache.is_empty()
-    cache.put("ab", (scan, Pose.identity()))
-    kept = cache.get("ab")
-    assert isinstance(kept, tuple)
-    assert kept[0].content_hash() == scan.content_hash()
-    assert not kept[0].points.flags.writeable and not kept[1].rotation.flags.writeable
-    assert [path.name for path in tmp_path.iterdir()] == ["ab.record"]
-
-
-@pytest.mark.parametrize("length", [0, 1, 31, 32, 33, -1])
-def test_truncated_entry_counts_as_absent(tmp_path: Path, length: int):
-    cache = FileCache(tmp_path)
-    cache.put("ab", tuple(range(100)))
-    whole = (tmp_path / "ab.record").read_bytes()
-    (tmp_path / "ab.record").write_bytes(whole[:length])
-    assert cache.get("ab") is None
-    cache.put("ab", "again")
-    assert cache.get("ab") == "again"
-
-
-def test_damaged_entry_counts_as_absent(tmp_path: Path):
-    cache = FileCache(tmp_path)
-    cache.put("ab", "value")
-    data = bytearray((tmp_path / "ab.record").read_bytes())
-    data[-5] ^= 1
-    (tmp_path / "ab.record").write_bytes(data)
-    assert cache.get("ab") is None
-
-
-class Evil:
-    """Runs code when it is unpickled."""
-
-    def __reduce__(self) -> tuple[object, tuple[str]]:
-        return (pytest.fail, ("code of the cache was run",))
-
-
-@pytest.mark.parametrize("suffix", ["record", "pkl"])
-def test_a_folder_from_elsewhere_cannot_run_code(tmp_path: Path, suffix: str):
-    objects = io.BytesIO()
-    np.savez(objects, tree=np.array([Evil()], dtype=object))
-    for body in (pickle.dumps(Evil()), objects.getvalue()):
-        (tmp_path / f"ab.{suffix}").write_bytes(hashlib.sha256(body).digest() + body)
-        assert FileCache(tmp_path).get("ab") is None
-
-
-def test_keys_stay_inside_the_folder(tmp_path: Path):
-    with pytest.raises(ValueError, match="hex"):
-        FileCache(tmp_path / "cache").put("../ab", 1)
-    assert not list(tmp_path.iterdir())

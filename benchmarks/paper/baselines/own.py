@@ -9,12 +9,11 @@ from scipy.spatial.distance import cdist
 from benchmarks.paper.baselines.records import Answer, ScanPair, closeness
 from scanweld.config import CoarseConfig, Config, ContoursConfig, RefineConfig
 from scanweld.contours.coherence import contour_matcher
-from scanweld.evidence.field import make_field
 from scanweld.geometry.point_fit import FRACTION_EXPONENT, Trim
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features, describe
-from scanweld.pairs.registrar import PairRegistrar
+from scanweld.pairs.registrar import PairRegistrar, PairTask
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.published.coarse import CoarseAnswer, register_as_published
 from scanweld.published.m_icc import m_icc as align_by_m_icc
@@ -72,14 +71,9 @@ def right_matches(
 
 def searched(pair: ScanPair, config: Config) -> PairResult:
     """What a run does for a pair, features and all."""
-    scans = (pair.i, pair.j)
-    registrar = PairRegistrar(
-        scans=scans,
-        fields=[make_field(scan) for scan in scans],
-        contours=contour_matcher(scans, config.contours),
-        config=config,
-    )
-    return registrar.register((0, 1), {k: describe(s, config.heat) for k, s in enumerate(scans)})
+    registrar = PairRegistrar(config=config)
+    parts = [registrar.scan(scan, describe(scan, config.heat)) for scan in (pair.i, pair.j)]
+    return registrar.register(PairTask(edge=(0, 1)), *parts)
 
 
 def icp(pair: ScanPair, start: Pose, seed: int) -> Answer:

@@ -2,9 +2,11 @@
 
 import logging
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
+from scanweld.app.cache import FileCache, cache_folder
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
@@ -19,6 +21,7 @@ from scanweld.pipeline import run as pipeline
 from scanweld.preparation.thinning import thinned
 from scanweld.reconstruction import Reconstruction
 from scanweld.work.progress import Progress, ScanRefused, StageAdvanced, silent, telling
+from scanweld.work.runners import Runner
 from scanweld.work.stage_log import peak_memory_mb
 from scanweld.work.threads import num_workers
 
@@ -27,16 +30,20 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Limits:
-    """What a run may take of the machine.
+    """What a run may take of the machine, and of others.
 
     Attributes:
         workers: Threads; as many as there are cores if None.
         memory: Bytes: large scans are thinned for it, and fewer are prepared at a time if need be.
             Any if None.
+        keeps: Whether finished work is kept beside the output, for later runs, and found there.
+        scheduler: Address of a cluster that works over scans and pairs; None for threads alone.
     """
 
     workers: int | None = None
     memory: int | None = None
+    keeps: bool = True
+    scheduler: str | None = None
 
 
 NO_LIMITS = Limits()
@@ -59,17 +66,21 @@ def run_job(
         output: The folder to be made; it appears when it is whole.
         config: Settings; the defaults if not given.
         knowledge: What is known of the scans beforehand.
-        limits: What the run may take of the machine.
+        limits: What the run may take of the machine, and of others.
         force: Whether an output that is there already is replaced.
         progress: Told of stages, their finished items, and scans that are refused.
 
     Raises:
-        ScanweldError: If there is too little to work on, or the output cannot be written. Files
-            that cannot be read are named in the result instead.
+        ScanweldError: If there is too little to work on, the output cannot be written, or there is
+            no such cluster. Files that cannot be read are named in the result instead.
     """
     files, workers, memory = collect(inputs), limits.workers, limits.memory
     paths = [file.path for file in files]
-    with Workspace(Path(output), inputs=paths, force=force) as workspace:
+    cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
+    with (
+        Workspace(Path(output), inputs=paths, force=force) as workspace,
+        _runner(limits.scheduler) as runner,
+    ):
         max_points = None if memory is None else points_within(memory, paths)
         scans, unreadable = read_all(files, progress, max_points)
         if memory is not None:
@@ -80,8 +91,8 @@ def run_job(
             config or Config(),
             knowledge=knowledge,
             unreadable=unreadable,
-            workers=workers,
-            cache=workspace.cache,
+            workers=runner or workers,
+            cache=cache,
             progress=progress,
         )
         places = relative_paths(files, workspace.output)
@@ -92,6 +103,14 @@ def run_job(
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
     return result
+
+
+def _runner(scheduler: str | None) -> AbstractContextManager[Runner | None]:
+    if scheduler is None:
+        return nullcontext()
+    from scanweld.work.cluster import Cluster  # only who has a cluster has what it takes
+
+    return Cluster(scheduler)
 
 
 def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:

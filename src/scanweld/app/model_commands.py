@@ -22,6 +22,7 @@ from scanweld.app.options import (
 from scanweld.choices import Method
 
 if TYPE_CHECKING:
+    from scanweld.app.cache import CacheSize
     from scanweld.knowledge.facts import Knowledge
 
 # What the commands do is imported inside them: help then starts at once.
@@ -86,6 +87,14 @@ class RunOptions:
         str | None,
         typer.Option(metavar="SIZE", help="Most memory, as 2G or 800M; large scans are thinned."),
     ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A dask cluster to work on, as tcp://host:8786."),
+    ] = None
+    no_cache: Annotated[
+        bool,
+        typer.Option("--no-cache", help="Neither keep finished work beside the output nor use it."),
+    ] = False
     unit: UnitOption = None
     method: Annotated[
         Method | None, typer.Option(help="robust (the default), or paper: as published.")
@@ -102,9 +111,9 @@ class RunOptions:
 @takes(RunOptions)
 def run(options: RunOptions) -> None:
     """Register and fuse scans: poses, a model and a verdict."""
+    from scanweld.app.cache import cache_folder
     from scanweld.app.job import Limits, run_job
     from scanweld.app.memory import parse_size
-    from scanweld.app.workspace import work_folder
     from scanweld.config import load_config
 
     output, memory = options.output, options.memory
@@ -114,7 +123,12 @@ def run(options: RunOptions) -> None:
     try:
         with options.show.reporting() as progress:
             size = None if memory is None else parse_size(memory)
-            limits = Limits(workers=options.workers, memory=size)
+            limits = Limits(
+                workers=options.workers,
+                memory=size,
+                keeps=not options.no_cache,
+                scheduler=options.scheduler,
+            )
             result = run_job(
                 options.inputs,
                 output,
@@ -125,8 +139,9 @@ def run(options: RunOptions) -> None:
                 progress=progress,
             )
     except KeyboardInterrupt:
-        kept = work_folder(output)
-        remark = f"the same command goes on from {kept}" if kept.exists() else "nothing was written"
+        kept = cache_folder(output)
+        goes_on = kept.exists() and not options.no_cache
+        remark = f"the same command goes on from {kept}" if goes_on else "nothing was written"
         typer.echo(f"scanweld: interrupted; {remark}", err=True)
         raise typer.Exit(INTERRUPTED) from None
     options.show.finish(result, output)
@@ -198,3 +213,30 @@ def export(options: ExportOptions) -> None:
 
     lines = export_model(options.model_dir, options.output, options.wanted, force=options.force)
     typer.echo("\n".join(lines))
+
+
+cache = typer.Typer(
+    help="Finished work that runs keep beside their outputs.", rich_markup_mode=None
+)
+Place = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Where models were made.")]
+
+
+@cache.command("info")
+def cache_info(folder: Place = Path()) -> None:
+    """Show how much is kept."""
+    from scanweld.app.cache import NAME, FileCache
+
+    typer.echo(_told(folder / NAME, FileCache(folder / NAME).size(), "kept"))
+
+
+@cache.command("clear")
+def cache_clear(folder: Place = Path()) -> None:
+    """Remove all that is kept: nothing but time is lost."""
+    from scanweld.app.cache import NAME, FileCache
+
+    typer.echo(_told(folder / NAME, FileCache(folder / NAME).clear(), "removed"))
+
+
+def _told(folder: Path, size: "CacheSize", what: str) -> str:
+    megabytes = size.bytes / 1e6
+    return f"{folder}: {size.records} records {what}, {megabytes:.1f} MB"

@@ -1,7 +1,7 @@
 """The output folder: made aside, moved into place when whole.
 
-For an output ``model`` all work goes to ``.model.work`` beside it: a lock, the cache of what was
-finished (a rerun continues from there), and the folder that becomes the output in the end.
+For an output ``model`` all work goes to ``.model.work`` beside it: a lock, and the folder that
+becomes the output in the end. What is finished on the way is kept elsewhere (``app.cache``).
 """
 
 import contextlib
@@ -12,9 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from scanweld.app.cache import FileCache
 from scanweld.app.lock import Lock
-from scanweld.errors import ScanweldError, WriteError
+from scanweld.errors import WriteError
 
 logger = logging.getLogger(__name__)
 
@@ -22,9 +21,8 @@ logger = logging.getLogger(__name__)
 class Workspace:
     """Where a run works, as a context.
 
-    Entering refuses an output that cannot be made, before any work. Leaving after ``publish``
-    removes the workspace; leaving by an error of the user's removes it if this run made it;
-    leaving by an interruption or a crash keeps what the cache holds.
+    Entering refuses an output that cannot be made, before any work. Leaving removes the workspace,
+    whether the output was published or not; an old output is then in its place again.
 
     Args:
         output: The folder to be made.
@@ -39,11 +37,9 @@ class Workspace:
         self.output = output.resolve()
         self.folder = work_folder(output)
         self.staging = self.folder / "output"
-        self.cache = FileCache(self.folder / "cache")
         self._old = self.folder / "old"
         self._inputs = [path.resolve() for path in inputs]
         self._force = force
-        self._published = False
         self._made: list[Path] = []
         self._lock: Lock | None = None
 
@@ -54,7 +50,7 @@ class Workspace:
             self._open()
             self._check_free()
         except OSError as error:
-            self._leave(keep=not self._is_new())
+            self._leave()
             raise WriteError(
                 f"{self.output}: cannot be written ({error.strerror}); choose another output"
             ) from error
@@ -70,10 +66,7 @@ class Workspace:
         traceback: TracebackType | None,
     ) -> None:
         self._put_back()
-        # An output that could not be written is worth another try; bad input is not.
-        is_refused = isinstance(error, ScanweldError) and not isinstance(error, WriteError)
-        is_spent = self._published or (is_refused and self._is_new())
-        self._leave(keep=not (is_spent or self.cache.is_empty()))
+        self._leave()
 
     def publish(self) -> None:
         """Move the finished folder to the output's place, and an old one out of it first.
@@ -85,7 +78,6 @@ class Workspace:
             if self._force and self.output.exists():
                 self.output.rename(self._old)
             self.staging.rename(self.output)
-            self._published = True
         except OSError as error:
             raise WriteError(
                 f"{self.output}: the finished output cannot be moved there ({error.strerror}); "
@@ -122,23 +114,21 @@ class Workspace:
         for leftover in (self._old, self.staging):
             self._clear(leftover)
         self.staging.mkdir()
-        (self.folder / "cache").mkdir(exist_ok=True)
 
     def _put_back(self) -> None:
         """Bring back an old output that was moved aside and not replaced."""
         if self._old.exists() and not _is_filled(self.output):
             self._old.rename(self.output)
 
-    def _is_new(self) -> bool:
-        return self.folder in self._made
-
-    def _leave(self, *, keep: bool) -> None:
-        """Remove the workspace or what is half done in it, and folders made that are empty."""
+    def _leave(self) -> None:
+        """Remove the workspace, and folders made that are empty; no old output without a new."""
         if self._lock is not None:
-            for part in [self.staging] if keep else self._parts():
-                self._clear(part)
-        self._unlock(remove=not keep)
-        for folder in (*(() if keep else (self.folder,)), *reversed(self._made)):
+            self._clear(self.staging)
+            if _is_filled(self.output):
+                self._clear(self._old)
+            self._lock.release(remove=True)
+            self._lock = None
+        for folder in (self.folder, *reversed(self._made)):
             # Another run may have begun in it by now: then it is not empty, and its own.
             with contextlib.suppress(OSError):
                 folder.rmdir()
@@ -152,14 +142,9 @@ class Workspace:
         except OSError as error:
             logger.warning("%s: cannot be removed (%s); remove it by hand", folder, error.strerror)
 
-    def _parts(self) -> list[Path]:
-        """What the workspace holds, but for the lock: that goes last of all."""
-        held = () if self._lock is None else self._lock.files
-        return [part for part in self.folder.iterdir() if part not in held]
-
-    def _unlock(self, *, remove: bool = False) -> None:
+    def _unlock(self) -> None:
         if self._lock is not None:
-            self._lock.release(remove=remove)
+            self._lock.release()
             self._lock = None
 
 

@@ -29,7 +29,8 @@ from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.work.threads import map_in_order
+from scanweld.work.progress import Cache, NoCache, silent
+from scanweld.work.stage_log import Stages, work_key
 
 logger = logging.getLogger(__name__)
 
@@ -46,6 +47,7 @@ def fuse(
     *,
     prepare: PrepareConfig | None = None,
     workers: int = 1,
+    cache: Cache | None = None,
 ) -> TriangleMesh:
     """Fuse posed scans into one mesh, cut off where no scan saw a surface.
 
@@ -55,6 +57,7 @@ def fuse(
         config: Settings.
         prepare: Settings that the scans were prepared with; the defaults if not given.
         workers: Threads; the result is the same for any number.
+        cache: Keeps the scans' images.
 
     Returns:
         The mesh in the world frame with unit normals that point out, the number of scans that
@@ -68,7 +71,8 @@ def fuse(
         raise ValueError(f"{len(scans)} scans, but {len(world_from_sensor)} poses")
     if not scans:
         raise InputError("there is no surface to fuse: give at least one scan")
-    images = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), workers)
+    stages = Stages(workers=workers, cache=cache or NoCache(), progress=silent)
+    images = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), stages)
     voxel = voxel_edge(scans, config)
     depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
     truncation = max(config.truncation_voxels * voxel, 2.0 * depth)
@@ -92,7 +96,7 @@ def _images(
     world_from_sensor: Sequence[Pose],
     config: FusionConfig,
     prepare: PrepareConfig,
-    workers: int,
+    stages: Stages,
 ) -> list[PosedImage]:
     """The scans' images at full resolution, in an order that depends on their content alone."""
     posed = sorted(
@@ -100,13 +104,15 @@ def _images(
         key=lambda both: (both[0].content_hash, both[1].matrix().tobytes()),
     )
     pixels = image_pixels([scan for scan, _ in posed], config)
-    images = list(
-        map_in_order(
-            lambda k: pose_image(*posed[k], pixels[k], prepare),
-            range(len(posed)),
-            workers,
-        )
+    kept = stages.done(
+        lambda k: pose_image(posed[k][0], Pose.identity(), pixels[k], prepare),
+        range(len(posed)),
+        lambda k: work_key("image", posed[k][0].work_hash, pixels[k], prepare),
     )
+    images = [
+        replace(image, sensor_from_world=pose.inverse())
+        for image, (_, pose) in zip(kept, posed, strict=True)
+    ]
     trusts = free_space_trusts(images)
     return with_noise(
         [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)]

@@ -1,11 +1,14 @@
-"""Registers the pairs of a run: quickly, at a pose that is known, or thoroughly."""
+"""Registers a pair of a run: quickly, at a pose that is known, or thoroughly.
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+All that it takes can be pickled and is of two scans only, so that it can be done anywhere.
+"""
+
+from dataclasses import dataclass
 
 from scanweld.config import Config
 from scanweld.contours.coherence import ContourMatcher
-from scanweld.evidence.field import ScanField
+from scanweld.contours.contour_sets import ObservedContours, observe_contours
+from scanweld.evidence.field import ScanField, make_field
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features
@@ -20,52 +23,86 @@ Edge = tuple[int, int]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class PairRegistrar:
-    """All that registering any pair of a run takes.
+class PairScan:
+    """What registering its pairs thoroughly takes of a scan.
 
     Attributes:
-        scans: All scans.
-        fields: The scans, laid out.
-        contours: Finds contour matches of two scans.
-        config: Settings.
-        starts: Poses i_from_j of some pairs, between sensor frames, to be tried besides.
+        prepared: The scan.
+        field: The same, laid out.
+        contours: Its contours.
+        features: Its PA-HKS keypoints; None where the settings do without.
     """
 
-    scans: Sequence[PreparedScan]
-    fields: Sequence[ScanField]
-    contours: ContourMatcher
+    prepared: PreparedScan
+    field: ScanField
+    contours: ObservedContours
+    features: Features | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class PairTask:
+    """A pair to be registered.
+
+    Attributes:
+        edge: Indices (i, j), i < j.
+        start: A pose i_from_j between the sensor frames that users want to be tried besides.
+        asked: The pose that other pairs say.
+        found: What a quick search found.
+    """
+
+    edge: Edge
+    start: Pose | None = None
+    asked: Pose | None = None
+    found: PairResult | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class PairRegistrar:
+    """Registers pairs by the robust method.
+
+    Attributes:
+        config: Settings.
+    """
+
     config: Config
-    starts: Mapping[Edge, Pose] = field(default_factory=dict)
 
-    def problem(self, edge: Edge) -> PairProblem:
-        """The two scans of a pair (i, j), i < j."""
-        i, j = (self.fields[k] for k in edge)
-        config = self.config.pairs
-        return PairProblem(edge=edge, i=i, j=j, config=config)
+    def search_quickly(self, task: PairTask, i: ScanField, j: ScanField) -> PairResult:
+        """A quick search of a pair, from any start pose."""
+        return search_quickly(self._problem(task, i, j), task.start)
 
-    def search_quickly(self, edge: Edge) -> PairResult:
-        """A quick search of a pair (i, j), i < j, from any start pose."""
-        return search_quickly(self.problem(edge), self.starts.get(edge))
+    def ask(self, task: PairTask, i: ScanField, j: ScanField) -> PairResult:
+        """A pair at the pose that other pairs say, beside what was found of it.
 
-    def ask(self, edge: Edge, i_from_j: Pose, found: PairResult | None) -> PairResult:
-        """A pair (i, j), i < j, at the pose that other pairs say, beside what was found of it."""
-        return ask(self.problem(edge), i_from_j, found)
-
-    def register(self, edge: Edge, features: Mapping[int, Features]) -> PairResult:
-        """Register a pair (i, j), i < j, thoroughly, from any start pose.
-
-        Args:
-            edge: The pair.
-            features: PA-HKS keypoints of its scans, unless the settings do without.
+        Raises:
+            ValueError: If the task names no pose.
         """
-        problem = self.problem(edge)
+        if task.asked is None:
+            raise ValueError("there is no pose to ask about")
+        return ask(self._problem(task, i, j), task.asked, task.found)
+
+    def register(self, task: PairTask, i: PairScan, j: PairScan) -> PairResult:
+        """Register a pair thoroughly, from any start pose."""
+        problem = self._problem(task, i.field, j.field)
+        both = (i, j)
+        contours = ContourMatcher(
+            observed=[scan.contours for scan in both], config=self.config.contours
+        )
         polish = JointPolish(
-            scans=self.scans,
-            edge=edge,
+            scans=[scan.prepared for scan in both],
+            edge=(0, 1),
             centre_j=problem.j.centre,
             diameter=problem.diameter,
-            contours=self.contours,
+            contours=contours,
             config=self.config.refine,
         )
-        sets = [pair_anchors(self.fields[k], features.get(k), self.config.pairs) for k in edge]
-        return register_pair(problem, list(zip(*sets, strict=True)), polish, self.starts.get(edge))
+        sets = [pair_anchors(scan.field, scan.features, self.config.pairs) for scan in both]
+        return register_pair(problem, list(zip(*sets, strict=True)), polish, task.start)
+
+    def scan(self, prepared: PreparedScan, features: Features | None = None) -> PairScan:
+        """What ``register`` takes of a scan."""
+        contours = observe_contours(prepared, self.config.contours)
+        field = make_field(prepared)
+        return PairScan(prepared=prepared, field=field, contours=contours, features=features)
+
+    def _problem(self, task: PairTask, i: ScanField, j: ScanField) -> PairProblem:
+        return PairProblem(edge=task.edge, i=i, j=j, config=self.config.pairs)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -11,10 +12,10 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.knowledge.by_index import IndexedKnowledge
 from scanweld.knowledge.facts import Knowledge
-from scanweld.preparation import prepare, stands_on_support
+from scanweld.pipeline.preparations import Preparation, try_prepare
+from scanweld.preparation import stands_on_support
 from scanweld.work.progress import ScanRefused
-from scanweld.work.stage_log import Stages
-from scanweld.work.threads import map_in_order
+from scanweld.work.stage_log import Stages, work_key
 
 Refuse = Callable[[str, str], None]
 """Called with a scan's name and the reason why it cannot take part."""
@@ -78,18 +79,26 @@ def take_in(
             refused[name] = reason
             stages.progress(ScanRefused(scan=name, reason=reason))
 
-    def take(scan: RangeScan, outcome: PreparedScan | str) -> None:
+    def take(scan: RangeScan, outcome: Preparation | str) -> None:
         if isinstance(outcome, str):
             refuse(scan.name, outcome)
             taken.pop(scan.name, None)
         else:
-            taken[scan.name] = outcome
+            taken[scan.name] = outcome.of(scan, hashes[scan.name])
 
+    def key(stage: str, scan: RangeScan) -> str:
+        return work_key(stage, hashes[scan.name], scan.viewpoint, config.prepare)
+
+    hashes = {scan.name: scan.content_hash() for scan in scans}
     taken: dict[str, PreparedScan] = {}
     with stages.stage("prepare") as counts:
-        kept = _of_one_size(_without_duplicates(scans, refuse), refuse)
-        stages.each("prepare", lambda scan: _try_prepare(scan, config), kept, then=take)
-        for scan, outcome in _without_support(kept, taken, config, stages.workers):
+        kept = _of_one_size(_without_duplicates(scans, hashes, refuse), refuse)
+        ready = partial(try_prepare, config=config.prepare)
+        stages.each("prepare", ready, kept, partial(key, "prepare"), take)
+        again = _on_support(kept, taken, config)
+        ready = partial(ready, without_support=True)
+        outcomes = stages.done(ready, again, partial(key, "prepare without support"))
+        for scan, outcome in zip(again, outcomes, strict=True):
             take(scan, outcome)
         prepared = list(taken.values())
         counts["scans"] = len(prepared)
@@ -111,11 +120,13 @@ def take_in(
     )
 
 
-def _without_duplicates(scans: Sequence[RangeScan], refuse: Refuse) -> list[RangeScan]:
+def _without_duplicates(
+    scans: Sequence[RangeScan], hashes: Mapping[str, str], refuse: Refuse
+) -> list[RangeScan]:
     first: dict[str, str] = {}
     kept = []
     for scan in sorted(scans, key=lambda scan: scan.name):
-        original = first.setdefault(scan.content_hash(), scan.name)
+        original = first.setdefault(hashes[scan.name], scan.name)
         if original == scan.name:
             kept.append(scan)
         else:
@@ -145,24 +156,13 @@ def _unit_hint(ratio: float) -> str:
     return f"; units mixed up ({UNIT_RATIOS[closest]})? Give all scans in one unit"
 
 
-def _without_support(
-    scans: Sequence[RangeScan], taken: Mapping[str, PreparedScan], config: Config, workers: int
-) -> list[tuple[RangeScan, PreparedScan | str]]:
-    """Scans that stand on a table, prepared again without it, if it is to go and most show one."""
+def _on_support(
+    scans: Sequence[RangeScan], taken: Mapping[str, PreparedScan], config: Config
+) -> list[RangeScan]:
+    """Scans that stand on a table, if it is to go and most show one."""
     if config.prepare.support != "left out":
         return []
     standing = {name for name, scan in taken.items() if stands_on_support(scan)}
     if not standing or len(standing) < MOST * len(taken):
         return []
-    again = [scan for scan in scans if scan.name in standing]
-    outcomes = map_in_order(lambda scan: _try_prepare(scan, config, True), again, workers)
-    return list(zip(again, outcomes, strict=True))
-
-
-def _try_prepare(
-    scan: RangeScan, config: Config, without_support: bool = False
-) -> PreparedScan | str:
-    try:
-        return prepare(scan, config.prepare, without_support=without_support)
-    except InputError as error:
-        return str(error).removeprefix(f"{scan.name}: ")
+    return [scan for scan in scans if scan.name in standing]

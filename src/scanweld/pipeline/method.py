@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from scanweld.config import Section
+from scanweld.contours.coherence import ContourMatcher
+from scanweld.evidence.field import ScanField
 from scanweld.evidence.judge import Judge
-from scanweld.geometry.pose import Pose
 from scanweld.graph.problem import Settle
 from scanweld.graph.refine_graph import Refine
-from scanweld.graph.view_graph import Edge
 from scanweld.heat.features import Features
+from scanweld.pairs.registrar import PairScan, PairTask
 from scanweld.pairs.result import PairResult
 from scanweld.pipeline.intake import Intake
 
@@ -33,12 +34,12 @@ class Scene:
 class Shortcuts(Protocol):
     """Ways to spare the thorough search where scans leave no doubt."""
 
-    def search_quickly(self, edge: Edge) -> PairResult:
-        """A quick search of a pair (i, j), i < j."""
+    def search_quickly(self, task: PairTask, i: ScanField, j: ScanField) -> PairResult:
+        """A quick search of a pair."""
         ...
 
-    def ask(self, edge: Edge, i_from_j: Pose, found: PairResult | None) -> PairResult:
-        """A pair (i, j), i < j, at the pose that other pairs say, beside what was found of it."""
+    def ask(self, task: PairTask, i: ScanField, j: ScanField) -> PairResult:
+        """A pair at the pose that other pairs say, beside what was found of it."""
         ...
 
 
@@ -49,8 +50,9 @@ class Method:
     Attributes:
         name: Of the method, for the keys of finished work.
         settings: Sections that a pair's result depends on.
-        register: Registers a pair (i, j), i < j, with the keypoints of its scans, and judges what
-            two scans alone say.
+        register: Registers a pair of two scans and judges what these alone say. Can be pickled, as
+            can the shortcuts.
+        contours: The contours of all scans.
         settle: Refines the poses of a component as it grows.
         refine: Refines all poses of a component together.
         needs_features: Whether registering takes PA-HKS keypoints.
@@ -59,7 +61,8 @@ class Method:
 
     name: str
     settings: tuple[Section, ...]
-    register: Callable[[Edge, Mapping[int, Features]], PairResult]
+    register: Callable[[PairTask, PairScan, PairScan], PairResult]
+    contours: ContourMatcher
     settle: Settle
     refine: Refine
     needs_features: bool = True

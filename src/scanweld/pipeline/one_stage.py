@@ -9,7 +9,6 @@ from itertools import combinations
 from scanweld.config import Config
 from scanweld.contours.coherence import contour_matcher
 from scanweld.errors import InputError
-from scanweld.evidence.field import make_field
 from scanweld.fusion.fuse import fuse as fuse_prepared
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
@@ -17,7 +16,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.heat.features import describe
-from scanweld.pairs.registrar import PairRegistrar
+from scanweld.pairs.registrar import PairRegistrar, PairTask
 from scanweld.pairs.result import PairKind
 from scanweld.pipeline.conclude import pair_report
 from scanweld.preparation.prepare import prepare as prepare_scan
@@ -60,11 +59,9 @@ def register_pair(a: RangeScan, b: RangeScan, config: Config | None = None) -> P
     config = config or Config()
     with single_threaded_algebra():
         prepared = [prepare(scan, config) for scan in sorted((a, b), key=lambda scan: scan.name)]
-        features = {k: describe(scan, config.heat) for k, scan in enumerate(prepared)}
-        fields = [make_field(scan) for scan in prepared]
-        contours = contour_matcher(prepared, config.contours)
-        registrar = PairRegistrar(scans=prepared, fields=fields, contours=contours, config=config)
-        result = registrar.register((0, 1), features)
+        registrar = PairRegistrar(config=config)
+        parts = [registrar.scan(scan, describe(scan, config.heat)) for scan in prepared]
+        result = registrar.register(PairTask(edge=(0, 1)), *parts)
     is_good = result.kind is PairKind.GOOD
     graph = ViewGraph(
         pairs={(0, 1): result},

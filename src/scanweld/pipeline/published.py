@@ -10,12 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from scanweld.config import Config
+from scanweld.contours.coherence import contour_matcher
 from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
 from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
-from scanweld.heat.features import Features
 from scanweld.pairs.problem import PairProblem
+from scanweld.pairs.registrar import PairScan, PairTask
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import no_pose
 from scanweld.pipeline.method import Method, Scene
@@ -26,7 +27,7 @@ from scanweld.published.mm_icc import mm_icc
 
 def published_method(scene: Scene, config: Config) -> Method:
     """The published method for the scans of a run."""
-    registrar = _PublishedRegistrar(scene=scene, config=config)
+    registrar = _PublishedRegistrar(config=config)
 
     def stay(poses: Poses) -> Poses:
         """Unlike in the robust method nothing is refined while components grow."""
@@ -43,6 +44,7 @@ def published_method(scene: Scene, config: Config) -> Method:
         name="published",
         settings=(config.prepare, config.heat, config.coarse, config.contours, config.pairs),
         register=registrar.register,
+        contours=contour_matcher(scene.intake.prepared, config.contours),
         settle=stay,
         refine=refine,
     )
@@ -52,31 +54,22 @@ def published_method(scene: Scene, config: Config) -> Method:
 class _PublishedRegistrar:
     """Every pair by the coarse step (paper 3.1) and MM-ICC of its two views (3.2), and judged."""
 
-    scene: Scene
     config: Config
 
-    def register(self, edge: Edge, features: Mapping[int, Features]) -> PairResult:
+    def register(self, task: PairTask, i: PairScan, j: PairScan) -> PairResult:
         """Register a pair; where a start pose is given, what MM-ICC makes of it counts as well."""
-        i, j = edge
-        prepared = self.scene.intake.prepared
+        assert i.features is not None and j.features is not None
         coarse = register_as_published(
-            prepared[i], prepared[j], features[i], features[j], self.config.coarse
+            i.prepared, j.prepared, i.features, j.features, self.config.coarse
         )
-        starts = [coarse.i_from_j, self.scene.intake.known.starts.get(edge)]
-        results = [self._refined(edge, start) for start in starts if start is not None]
+        starts = [coarse.i_from_j, task.start]
+        results = [self._refined(task, i, j, start) for start in starts if start is not None]
         if not results:
-            return no_pose(i, j, coarse.reason)
+            return no_pose(*task.edge, coarse.reason)
         return max(results, key=lambda result: result.alternatives[0].score)
 
-    def _refined(self, edge: Edge, start: Pose) -> PairResult:
-        i, j = edge
-        prepared, judge = self.scene.intake.prepared, self.scene.judge
-        poses = {i: Pose.identity(), j: start}
-        fine = mm_icc(prepared, poses, [edge], self.config.contours).poses
-        problem = PairProblem(
-            edge=edge,
-            i=judge.fields[i],
-            j=judge.fields[j],
-            config=self.config.pairs,
-        )
-        return judge_pose(problem, fine[i].inverse() @ fine[j])
+    def _refined(self, task: PairTask, i: PairScan, j: PairScan, start: Pose) -> PairResult:
+        poses = {0: Pose.identity(), 1: start}
+        fine = mm_icc([i.prepared, j.prepared], poses, [(0, 1)], self.config.contours).poses
+        problem = PairProblem(edge=task.edge, i=i.field, j=j.field, config=self.config.pairs)
+        return judge_pose(problem, fine[0].inverse() @ fine[1])

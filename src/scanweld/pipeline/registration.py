@@ -6,9 +6,10 @@ Only pairs across what stays apart are searched thoroughly.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
-from scanweld.config import Config
+from scanweld.config import Config, Section
 from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
 from scanweld.graph.partners import partners
@@ -17,14 +18,19 @@ from scanweld.graph.view_graph import Edge
 from scanweld.heat.features import describe
 from scanweld.knowledge.turntable import Turntable, find_turntable
 from scanweld.pairs.quick import is_clear
+from scanweld.pairs.registrar import PairScan, PairTask
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import not_compared
 from scanweld.pipeline.choice import first_pairs, pairs_across, pairs_beside, pairs_left
 from scanweld.pipeline.method import Method, Scene, Shortcuts
 from scanweld.pipeline.problem import graph_problem, same_pose
+from scanweld.work.runners import Shared
 from scanweld.work.stage_log import Stages, work_key
 
 NOT_COMPARED = "not compared: both scans are placed, or refused, by others"
+
+BLOCK = 16
+"""Pairs of so many scans and so many others are registered in a row."""
 
 Pairs = Mapping[Edge, PairResult]
 
@@ -54,7 +60,7 @@ def register_pairs(scene: Scene, method: Method, config: Config, stages: Stages)
         with stages.stage("pairs") as counts:
             found, components = _clear(scene, method, config, stages)
             counts["pairs"] = len(found)
-            asked = _asked(scene, found, components, method.shortcuts, stages)
+            asked = _asked(scene, found, components, method.shortcuts, config, stages)
             counts["placed"] = sum(len(poses) for poses in components)
     across = pairs_across(num_scans, components, found)
     found.update(asked)
@@ -91,7 +97,8 @@ def _clear(
         edges = [e for e in choose(len(scene.intake.prepared), components) if e not in found]
         if not edges:
             continue
-        found.update(_kept("pairs", scene, edges, method, stages, method.shortcuts.search_quickly))
+        quickly = method.shortcuts.search_quickly
+        found.update(_kept("pairs", scene, edges, method, stages, quickly, _fields(scene, config)))
         axis = common_axis(scene, found, config)
         problem = graph_problem(scene, found, axis, method, config)
         clear = [edge for edge, pair in problem.pairs.items() if is_clear(pair, config.pairs)]
@@ -104,6 +111,7 @@ def _asked(
     found: Pairs,
     components: Sequence[Poses],
     shortcuts: Shortcuts,
+    config: Config,
     stages: Stages,
 ) -> dict[Edge, PairResult]:
     """Pairs within components at the pose that follows; what there is no need to ask is left."""
@@ -112,12 +120,12 @@ def _asked(
         for poses in components
         for edge in {*partners(poses, scene.judge), *(e for e in found if set(e) <= set(poses))}
     }
-
-    def ask(edge: Edge) -> PairResult:
-        return shortcuts.ask(edge, within[edge], found.get(edge))
-
-    edges = sorted(within)
-    return dict(zip(edges, stages.each("pairs", ask, edges), strict=True))
+    tasks = [
+        PairTask(edge=edge, asked=within[edge], found=found.get(edge))
+        for edge in sorted(within, key=_in_blocks)
+    ]
+    results = stages.each("pairs", shortcuts.ask, tasks, shared=_fields(scene, config))
+    return {task.edge: result for task, result in zip(tasks, results, strict=True)}
 
 
 def _described(
@@ -131,19 +139,40 @@ def _described(
     with stages.stage("features") as counts:
         found = stages.each(
             "features",
-            lambda k: describe(prepared[k], config.heat),
-            scans,
-            lambda k: work_key("features", prepared[k].work_hash, config.prepare, config.heat),
+            partial(describe, config=config.heat),
+            [prepared[k] for k in scans],
+            lambda scan: work_key("features", scan.work_hash, config.prepare, config.heat),
         )
         counts["keypoints"] = sum(len(features.points) for features in found)
     return replace(scene, features=dict(zip(scans, found, strict=True)))
 
 
 def _searched(scene: Scene, edges: Sequence[Edge], method: Method, stages: Stages) -> Pairs:
-    def register(edge: Edge) -> PairResult:
-        return method.register(edge, scene.features)
+    scans = {
+        k: PairScan(
+            prepared=scene.intake.prepared[k],
+            field=scene.judge.fields[k],
+            contours=method.contours.observed[k],
+            features=scene.features.get(k),
+        )
+        for k in {k for edge in edges for k in edge}
+    }
+    shared = _shared(scene, f"{method.name} scan", scans, *method.settings)
+    return _kept("search", scene, edges, method, stages, method.register, shared)
 
-    return _kept("search", scene, edges, method, stages, register)
+
+def _fields(scene: Scene, config: Config) -> Shared[PairTask]:
+    fields = dict(enumerate(scene.judge.fields))
+    return _shared(scene, "field", fields, config.prepare)
+
+
+def _shared(
+    scene: Scene, what: str, parts: Mapping[int, object], *settings: Section
+) -> Shared[PairTask]:
+    """What pairs take of their scans, each named after all that it depends on."""
+    prepared = scene.intake.prepared
+    names = {k: work_key(what, prepared[k].work_hash, *settings) for k in parts}
+    return Shared(parts=parts, names=names, of=lambda task: task.edge)
 
 
 def _kept(
@@ -152,19 +181,27 @@ def _kept(
     edges: Sequence[Edge],
     method: Method,
     stages: Stages,
-    register: Callable[[Edge], PairResult],
+    register: Callable[..., PairResult],
+    shared: Shared[PairTask],
 ) -> dict[Edge, PairResult]:
     """Results of pairs, each kept under what it depends on: its scans, their start, settings."""
     intake = scene.intake
 
-    def key(edge: Edge) -> str:
-        hashes = [intake.prepared[k].work_hash for k in edge]
+    def key(task: PairTask) -> str:
+        hashes = [intake.prepared[k].work_hash for k in task.edge]
         return work_key(
-            f"{method.name} {stage}", *hashes, *method.settings, *intake.known.start_key(edge)
+            f"{method.name} {stage}", *hashes, *method.settings, *intake.known.start_key(task.edge)
         )
 
-    results = stages.each(stage, register, edges, key)
-    return {
-        edge: replace(result, i=edge[0], j=edge[1])
-        for edge, result in zip(edges, results, strict=True)
-    }
+    tasks = [
+        PairTask(edge=edge, start=intake.known.starts.get(edge))
+        for edge in sorted(edges, key=_in_blocks)
+    ]
+    results = stages.each(stage, register, tasks, key, shared=shared)
+    found = {task.edge: result for task, result in zip(tasks, results, strict=True)}
+    return {edge: replace(found[edge], i=edge[0], j=edge[1]) for edge in edges}
+
+
+def _in_blocks(edge: Edge) -> tuple[int, ...]:
+    """Orders pairs so that a machine that takes some in a row needs few scans for them."""
+    return (*(k // BLOCK for k in edge), *edge)

@@ -21,13 +21,7 @@ def robust_method(scene: Scene, config: Config) -> Method:
     """The robust method for the scans of a run."""
     scans = scene.intake.prepared
     contours = contour_matcher(scans, config.contours)
-    registrar = PairRegistrar(
-        scans=scans,
-        fields=scene.judge.fields,
-        contours=contours,
-        config=config,
-        starts=scene.intake.known.starts,
-    )
+    registrar = PairRegistrar(config=config)
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
     def settle(poses: Poses) -> Poses:
@@ -44,6 +38,7 @@ def robust_method(scene: Scene, config: Config) -> Method:
         name="robust",
         settings=(config.prepare, config.heat, config.pairs, config.contours, config.refine),
         register=registrar.register,
+        contours=contours,
         settle=settle,
         refine=refine,
         needs_features=config.pairs.keypoints != "even",

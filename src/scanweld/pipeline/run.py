@@ -21,6 +21,7 @@ from scanweld.pipeline.stages import (
 )
 from scanweld.reconstruction import Reconstruction
 from scanweld.work.progress import Cache, NoCache, Progress, silent
+from scanweld.work.runners import Runner
 from scanweld.work.stage_log import Stages
 from scanweld.work.threads import num_workers, single_threaded_algebra
 
@@ -34,7 +35,7 @@ def run(
     *,
     knowledge: Knowledge | None = None,
     unreadable: Mapping[str, str] | None = None,
-    workers: int | None = None,
+    workers: int | Runner | None = None,
     cache: Cache | None = None,
     progress: Progress = silent,
 ) -> Reconstruction:
@@ -45,8 +46,9 @@ def run(
         config: Settings of every stage; the defaults if not given.
         knowledge: What is known beforehand; each fact is checked and reported.
         unreadable: Name -> reason of scans that could not even be read, for the report.
-        workers: Threads over scans and pairs; as many as there are cores if not given.
-        cache: Keeps finished work, so that an interrupted run goes on where it stopped.
+        workers: Threads over scans and pairs, as many as there are cores if not given; or who else
+            carries that out, such as a cluster.
+        cache: Keeps finished work: what an earlier run has done, whole or not, is not done again.
         progress: Told of stages, their finished items, and scans that are refused.
 
     Returns:
@@ -58,7 +60,13 @@ def run(
         KnowledgeError: If what is known is about scans that are not there.
     """
     config = config or Config()
-    stages = Stages(workers=num_workers(workers), cache=cache or NoCache(), progress=progress)
+    runner = None if isinstance(workers, int) else workers
+    stages = Stages(
+        workers=num_workers(workers if isinstance(workers, int) else None),
+        cache=cache or NoCache(),
+        progress=progress,
+        runner=runner,
+    )
     with single_threaded_algebra():
         intake = take_in(scans, unreadable or {}, knowledge or Knowledge(), config, stages)
         return reconstruct(intake, config, stages)

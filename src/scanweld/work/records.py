@@ -53,7 +53,7 @@ class Records:
         np.savez(buffer, **stored)  # type: ignore[arg-type]  # its other keyword is not ours
         return buffer.getvalue()
 
-    def from_bytes(self, data: bytes) -> object:
+    def from_bytes(self, data: bytes | memoryview) -> object:
         """The value of some bytes.
 
         Raises:

@@ -5,13 +5,14 @@ import logging
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from scanweld.compiled.source import code_digest
 from scanweld.config import Section
 from scanweld.work.progress import Cache, Progress, StageAdvanced, telling
+from scanweld.work.runners import Runner, Shared, Threads
 from scanweld.work.threads import map_in_order
 
 try:
@@ -49,12 +50,14 @@ class Stages:
         workers: Threads that work over scans and pairs.
         cache: Where finished work is kept.
         progress: Told what happens.
+        runner: Carries out the work over scans and pairs; threads of this process if None.
         reports: Time, memory and counts of the stages so far.
     """
 
     workers: int
     cache: Cache
     progress: Progress
+    runner: Runner | None = None
     reports: dict[str, StageReport] = field(default_factory=dict)
 
     @contextmanager
@@ -71,39 +74,53 @@ class Stages:
     def each(
         self,
         name: str,
-        function: Callable[[Item], Result],
+        function: Callable[..., Result],
         items: Sequence[Item],
         key: Callable[[Item], str] | None = None,
         then: Callable[[Item, Result], None] | None = None,
+        shared: Shared[Item] | None = None,
     ) -> list[Result]:
-        """Apply a function to every item, in parallel.
+        """Apply a function to every item, in parallel, and tell of each that is done.
 
         Args:
             name: Of the stage.
-            function: What is to be done.
+            function: What is to be done. It can be pickled, and takes an item and its shared parts.
             items: With what.
             key: Of an item's work; if given, finished work is kept and found again.
             then: Called with each item and its result, in order, as soon as that is there.
+            shared: What many items need some of.
         """
-
-        def finished(item: Item) -> Result:
-            if key is None:
-                return function(item)
-            name_of_work = key(item)
-            kept = self.cache.get(name_of_work)
-            if kept is not None:
-                return kept  # type: ignore[return-value]  # what put() kept under the same key
-            result = function(item)
-            self.cache.put(name_of_work, result)
-            return result
-
         results = []
-        for item, result in zip(items, map_in_order(finished, items, self.workers), strict=True):
+        for item, result in zip(items, self.done(function, items, key, shared), strict=True):
             results.append(result)
             if then is not None:
                 then(item, result)
             self.progress(StageAdvanced(stage=name, done=len(results), total=len(items)))
         return results
+
+    def done(
+        self,
+        function: Callable[..., Result],
+        items: Sequence[Item],
+        key: Callable[[Item], str] | None = None,
+        shared: Shared[Item] | None = None,
+    ) -> Iterator[Result]:
+        """The results of ``each`` one after the other: found again, or worked out and kept."""
+        runner = self.runner or Threads(workers=self.workers)
+        if key is None:
+            yield from runner.map(function, items, shared)
+            return
+        names = [key(item) for item in items]
+        found = list(map_in_order(self.cache.get, names, self.workers))
+        left = [item for item, kept in zip(items, found, strict=True) if kept is None]
+        with closing(runner.map(function, left, shared)) as fresh:  # type: ignore[type-var]
+            for name, kept in zip(names, found, strict=True):
+                if kept is not None:
+                    yield kept  # type: ignore[misc]  # what put() kept under the same key
+                    continue
+                result = next(fresh)
+                self.cache.put(name, result)
+                yield result
 
 
 def work_key(stage: str, *parts: str | float | Section) -> str:

@@ -1,0 +1,113 @@
+"""Finished work on disk: exact or absent, bounded, and gone at any time without harm."""
+
+import hashlib
+import io
+import os
+import pickle
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scanweld.app.cache import CacheSize, FileCache, cache_folder
+from scanweld.errors import WriteError
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.scan import RangeScan
+from scanweld.work.records import Records
+from tests.command_line import scanweld
+
+
+def test_cached_scan_comes_back_equal_and_frozen(tmp_path: Path):
+    scan = RangeScan(name="a", points=np.arange(12.0).reshape(4, 3))
+    cache = FileCache(tmp_path, Records(RangeScan))
+    assert cache.get("ab") is None and cache.size().records == 0
+    cache.put("ab", (scan, Pose.identity()))
+    kept = cache.get("ab")
+    assert isinstance(kept, tuple)
+    assert kept[0].content_hash() == scan.content_hash()
+    assert not kept[0].points.flags.writeable and not kept[1].rotation.flags.writeable
+    assert [path.name for path in tmp_path.iterdir()] == ["ab.record"]
+
+
+@pytest.mark.parametrize("length", [0, 1, 31, 32, 33, -1])
+def test_truncated_entry_counts_as_absent(tmp_path: Path, length: int):
+    cache = FileCache(tmp_path)
+    cache.put("ab", tuple(range(100)))
+    whole = (tmp_path / "ab.record").read_bytes()
+    (tmp_path / "ab.record").write_bytes(whole[:length])
+    assert cache.get("ab") is None
+    cache.put("ab", "again")
+    assert cache.get("ab") == "again"
+
+
+def test_damaged_entry_counts_as_absent(tmp_path: Path):
+    cache = FileCache(tmp_path)
+    cache.put("ab", "value")
+    data = bytearray((tmp_path / "ab.record").read_bytes())
+    data[-5] ^= 1
+    (tmp_path / "ab.record").write_bytes(data)
+    assert cache.get("ab") is None
+
+
+class Evil:
+    """Runs code when it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return (pytest.fail, ("code of the cache was run",))
+
+
+@pytest.mark.parametrize("suffix", ["record", "pkl"])
+def test_a_folder_from_elsewhere_cannot_run_code(tmp_path: Path, suffix: str):
+    objects = io.BytesIO()
+    np.savez(objects, tree=np.array([Evil()], dtype=object))
+    for body in (pickle.dumps(Evil()), objects.getvalue()):
+        (tmp_path / f"ab.{suffix}").write_bytes(hashlib.sha256(body).digest() + body)
+        assert FileCache(tmp_path).get("ab") is None
+
+
+def test_keys_stay_inside_the_folder(tmp_path: Path):
+    with pytest.raises(ValueError, match="hex"):
+        FileCache(tmp_path / "cache").put("../ab", 1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_was_not_used_for_longest_goes_first(tmp_path: Path):
+    one = np.zeros(10_000)
+    cache = FileCache(tmp_path, max_bytes=500_000)
+    for k in range(5):
+        cache.put(f"a{k}", one)
+        os.utime(tmp_path / f"a{k}.record", ns=(k, k))
+    assert cache.get("a0") is not None  # and is now the last used
+    for reopened in (cache, FileCache(tmp_path, max_bytes=500_000)):
+        reopened.put(f"b{id(reopened)}", one)
+        reopened.put(f"c{id(reopened)}", one)
+        assert reopened.size().bytes <= 500_000
+    assert cache.get("a0") is not None and cache.get("a1") is None and cache.get("a2") is None
+
+
+def test_the_folder_may_go_while_a_run_uses_it(tmp_path: Path):
+    cache = FileCache(tmp_path / "deep" / "kept")
+    cache.put("ab", 1)
+    shutil.rmtree(tmp_path / "deep")
+    assert cache.get("ab") is None and cache.size() == CacheSize(records=0, bytes=0)
+    cache.put("ab", 2)
+    assert cache.get("ab") == 2
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(WriteError, match="--no-cache"):
+        FileCache(tmp_path / "file").put("ab", 1)
+
+
+def test_the_command_tells_and_clears(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    FileCache(cache_folder(Path("model"))).put("ab", np.zeros(250_000))
+    (tmp_path / "mine").write_text("mine")
+    assert scanweld("cache", "info") == 0
+    assert capsys.readouterr().out == ".scanweld-cache: 1 records kept, 2.0 MB\n"
+    assert scanweld("cache", "clear", tmp_path) == 0
+    assert "1 records removed" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert scanweld("cache", "clear") == 0
+    assert "0 records removed" in capsys.readouterr().out
