@@ -15,7 +15,7 @@ from benchmarks.results import Json
 from benchmarks.virtual.scene import Scene as Truth
 from scanweld.config import Config
 from scanweld.errors import InputError
-from scanweld.heat.features import describe
+from scanweld.heat.features import Features, describe
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pairs.quick import CLEAR_MARGIN, CLEAR_SCORE
 from scanweld.pairs.registrar import Edge, PairRegistrar
@@ -27,104 +27,117 @@ from scanweld.pipeline.stages import lay_out
 from scanweld.work.progress import NoCache, silent
 from scanweld.work.stage_log import Stages
 
-NUM_SETS, NUM_THOROUGH = 600, 200
+NUM_SETS, NUM_ALL = 600, 20
 SCORES, MARGINS = (1.0, 1.25, CLEAR_SCORE, 2.0, 3.0), (1.0, CLEAR_MARGIN, 1.5, 1.75, 2.0)
 """Multiples of the score and of the margin of a good pair."""
 
 
 @dataclass(kw_only=True)
 class ClearPairs(Kept):
-    """All pairs of the sets by seed, searched quickly; those of the first also thoroughly."""
+    """All pairs of sets, searched quickly; thoroughly too those that come out good, or all."""
 
     num_sets: int = NUM_SETS
     NAME: str = "clear"
 
     def units(self, quick: bool) -> list[Unit]:
-        """The quick searches first: they tell the most the soonest."""
+        """Sets by seed; all pairs of a few of them are searched thoroughly."""
         num = min(self.num_sets, 2) if quick else self.num_sets
-        thorough = [{"seed": k, "thorough": True} for k in range(min(num, NUM_THOROUGH))]
-        return [*({"seed": seed, "thorough": False} for seed in range(num)), *thorough]
+        return [{"seed": seed, "all": seed < NUM_ALL} for seed in range(num)]
 
     def measure(self, unit: Unit) -> Result:
-        """What a quick search says of every pair, and what is true of it."""
-        truth, config = make_set(unit["seed"]), Config()
-        stages = Stages(workers=1, cache=NoCache(), progress=silent)
+        """What both searches say of the pairs, and what is true of it."""
+        truth = make_set(unit["seed"])
         try:
-            intake = take_in(truth.scans, {}, Knowledge(), config, stages)
+            return {"pairs": [pair.searched(unit["all"]) for pair in pairs_of(truth)]}
         except InputError:
             return {"pairs": []}
-        scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
-        method, prepared = robust_method(scene, config), intake.prepared
-        registrar = method.shortcuts
-        assert isinstance(registrar, PairRegistrar)
-        features = {}
-        if unit["thorough"]:
-            features = {k: describe(scan, config.heat) for k, scan in enumerate(prepared)}
-        told = []
-        for edge in combinations(range(len(prepared)), 2):
-            quick = registrar.search_quickly(edge)
-            pair = _told(quick, edge, intake, truth)
-            if unit["thorough"]:
-                thorough = method.register(edge, features)
-                pair["thorough"] = _told(thorough, edge, intake, truth)
-                both = [result.best for result in (quick, thorough) if result.best is not None]
-                pair["same"] = len(both) == 2 and registrar.problem(edge).is_same(*both)
-            told.append(pair)
-        return {"pairs": told}
 
 
-def _told(result: PairResult, edge: Edge, intake: Intake, truth: Truth) -> Json:
-    i, j = (intake.prepared[k] for k in edge)
-    is_right, best = False, result.best
-    if best is not None:
-        between = i.scan_from_sensor @ best.i_from_j @ j.scan_from_sensor.inverse()
-        is_right = is_right_pair(i.name, j.name, between, truth)
-    return {
-        **{
-            "i": i.name,
-            "j": j.name,
-            "good": result.kind is PairKind.GOOD,
-            "right": is_right,
-            "margin": result.margin,
-        },
-        **{"score": best.score if best else 0.0, "is_open": bool({i.name, j.name} & truth.is_open)},
-    }
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Pair:
+    """A pair of a set, and all that searching it takes."""
+
+    edge: Edge
+    truth: Truth
+    intake: Intake
+    registrar: PairRegistrar
+    features: dict[int, Features]  # Of the scans for which something asked for them
+
+    def searched(self, all_thoroughly: bool) -> Json:
+        """What the quick search says; the thorough one where that says good, or always."""
+        quick = self.registrar.search_quickly(self.edge)
+        told = self._told(quick)
+        if not (told["good"] or all_thoroughly):
+            return told
+        for k in self.edge:
+            if k not in self.features:
+                self.features[k] = describe(self.intake.prepared[k], self.registrar.config.heat)
+        thorough = self.registrar.register(self.edge, self.features)
+        both = [result.best for result in (quick, thorough) if result.best is not None]
+        is_same = len(both) == 2 and self.registrar.problem(self.edge).is_same(*both)
+        return {**told, "thorough": self._told(thorough), "same": is_same}
+
+    def _told(self, result: PairResult) -> Json:
+        i, j = (self.intake.prepared[k] for k in self.edge)
+        is_right, best = False, result.best
+        if best is not None:
+            between = i.scan_from_sensor @ best.i_from_j @ j.scan_from_sensor.inverse()
+            is_right = is_right_pair(i.name, j.name, between, self.truth)
+        return {
+            **{"i": i.name, "j": j.name, "good": result.kind is PairKind.GOOD},
+            **{"right": is_right, "margin": result.margin},
+            "score": 0.0 if best is None else best.score,
+        }
+
+
+def pairs_of(truth: Truth) -> list[Pair]:
+    """The pairs of a set.
+
+    Raises:
+        InputError: If fewer than two of its scans are usable.
+    """
+    config, stages = Config(), Stages(workers=1, cache=NoCache(), progress=silent)
+    intake = take_in(truth.scans, {}, Knowledge(), config, stages)
+    scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
+    registrar = robust_method(scene, config).shortcuts
+    assert isinstance(registrar, PairRegistrar)
+    shared = {"truth": truth, "intake": intake, "registrar": registrar, "features": {}}
+    return [Pair(edge=edge, **shared) for edge in combinations(range(len(intake.prepared)), 2)]
 
 
 def over_limits(records: Sequence[Record]) -> Json:
     """How many pairs are clear by each limit on score and margin, and how many of these wrong."""
-    quick, both = (
-        [pair for r in records if r.unit["thorough"] is of for pair in r.result["pairs"]]
-        for of in (False, True)
-    )
+    pairs = [pair for record in records for pair in record.result["pairs"]]
+    of_all = [pair for r in records if r.unit["all"] for pair in r.result["pairs"]]
+    sure = [pair for pair in of_all if _is_sure(pair)]
     return {
-        **{"kind": "clear", "chosen": [CLEAR_SCORE, CLEAR_MARGIN], "pairs": len(quick)},
-        **{"sets": sum(not r.unit["thorough"] for r in records), "both": len(both)},
-        "thorough_good": sum(_is_sure(pair) for pair in both),
-        "thorough_wrong": sum(_is_sure(p) and not p["thorough"]["right"] for p in both),
-        "limits": [_at(quick, both, *limits) for limits in product(SCORES, MARGINS)],
+        **{"kind": "clear", "chosen": [CLEAR_SCORE, CLEAR_MARGIN], "pairs": len(pairs)},
+        **{"sets": len(records), "sets_of_all": sum(r.unit["all"] for r in records)},
+        **{"pairs_of_all": len(of_all), "sure": len(sure)},
+        "sure_wrong": sum(not pair["thorough"]["right"] for pair in sure),
+        "sure_and_clear": len(_clear(sure, CLEAR_SCORE, CLEAR_MARGIN)),
+        "limits": [_at(pairs, *limits) for limits in product(SCORES, MARGINS)],
     }
 
 
-def _at(quick: Sequence[Json], both: Sequence[Json], score: float, margin: float) -> Json:
-    """Clear pairs, wrong ones of them, and what the thorough search says of clear pairs."""
+def _at(pairs: Sequence[Json], score: float, margin: float) -> Json:
+    """Clear pairs, the wrong ones of them, and what the thorough search says of them."""
+    clear = _clear(pairs, score, margin)
+    wrong = [pair for pair in clear if not pair["right"]]
+    return {
+        **{"score": score, "margin": margin, "clear": len(clear), "wrong": len(wrong)},
+        # Not the shortcut's fault: the thorough search asserts the same pose.
+        "wrong_by_both": sum(pair["same"] and _is_sure(pair) for pair in wrong),
+        "other_pose": sum(not pair["same"] for pair in clear),
+        "not_sure": sum(not _is_sure(pair) for pair in clear),
+        "set_right": sum(not p["same"] and p["thorough"]["right"] for p in wrong),
+    }
+
+
+def _clear(pairs: Sequence[Json], score: float, margin: float) -> list[Json]:
     config = Config().pairs
-
-    def clear(pairs: Sequence[Json]) -> list[Json]:
-        least = score * config.min_score, margin * config.min_margin
-        return [
-            p for p in pairs if p["good"] and p["score"] >= least[0] and p["margin"] >= least[1]
-        ]
-
-    of_both = clear(both)
-    return {
-        **{"score": score, "margin": margin, "clear": len(clear(quick))},
-        "wrong": sum(not pair["right"] for pair in clear(quick)),
-        **{"clear_of_both": len(of_both), "other_pose": sum(not p["same"] for p in of_both)},
-        "not_good": sum(not _is_sure(pair) for pair in of_both),
-        # Wrong by the shortcut alone: the thorough search does not assert the same.
-        "shortcut_wrong": sum(not p["right"] and not (p["same"] and _is_sure(p)) for p in of_both),
-    }
+    least = score * config.min_score, margin * config.min_margin
+    return [p for p in pairs if p["good"] and p["score"] >= least[0] and p["margin"] >= least[1]]
 
 
 def _is_sure(pair: Json) -> bool:
