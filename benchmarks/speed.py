@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from statistics import mean, median, median_low
 
@@ -56,7 +56,7 @@ FLOORS = {
 
 def main() -> int:
     """Measure the parts that are asked for, and write the page."""
-    parts: dict[str, Callable[[argparse.Namespace], list[Json]]] = {
+    parts: dict[str, Callable[[argparse.Namespace], Iterable[Json]]] = {
         **{"clear": clear, "small": small, "first": first, "sets": sets, "many": many}
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
@@ -153,10 +153,10 @@ def _standings(found: PoseSet, truth: Truth) -> Json:
     return {str(s): errors.count(s) for s in (Standing.RIGHT, Standing.WRONG)}
 
 
-def sets(options: argparse.Namespace) -> list[Json]:
+def sets(options: argparse.Namespace) -> Iterator[Json]:
     """Whole runs, by one and by two threads, and Open3D in turn with them on one set."""
-    names = ["quick"] if options.quick else SETS
-    return [record for name in names for record in _set(name, options)]
+    for name in ["quick"] if options.quick else SETS:
+        yield from _set(name, options)
 
 
 def _set(name: str, options: argparse.Namespace) -> list[Json]:
@@ -182,9 +182,10 @@ def _median(runs: Sequence[Json]) -> Json:
     return {**runs[ratios.index(median_low(ratios))], "range": [min(ratios), max(ratios)]}
 
 
-def many(options: argparse.Namespace) -> list[Json]:
+def many(options: argparse.Namespace) -> Iterator[Json]:
     """More and more virtual scans of one object."""
-    return [] if options.quick else [_virtual(number, options) for number in options.many]
+    for number in () if options.quick else options.many:
+        yield _virtual(number, options)
 
 
 def _virtual(number: int, options: argparse.Namespace) -> Json:

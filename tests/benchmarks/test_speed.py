@@ -43,19 +43,20 @@ def a_pair(score: float, margin: float, *, right: bool, same: bool = True, sure:
 
 def test_limits_count_what_is_clear_and_wrong():
     pairs = [
-        *(a_pair(0.5, 0.9, right=True), a_pair(0.12, 0.9, right=False)),
+        *(a_pair(0.5, 0.9, right=True), a_pair(0.12, 0.9, right=False, sure=False)),
         *(a_pair(0.5, 0.45, right=False, same=False), a_pair(0.5, 0.65, right=False)),
         {**a_pair(0.9, 1.0, right=False), "good": False},
     ]
-    records = [Record(unit={"thorough": of}, result={"pairs": pairs}) for of in (False, True)]
+    records = [Record(unit={"all": of}, result={"pairs": pairs}) for of in (False, True)]
     found = clear.over_limits(records)
     told = {(a["score"], a["margin"]): (a["clear"], a["wrong"]) for a in found["limits"]}
-    assert told[1.0, 1.0] == (4, 3) and told[2.0, 1.0] == (3, 2)
-    assert told[2.0, 1.5] == (2, 1) and told[2.0, 2.0] == (1, 0)
+    assert told[1.0, 1.0] == (8, 6) and told[2.0, 1.0] == (6, 4)
+    assert told[2.0, 1.5] == (4, 2) and told[2.0, 2.0] == (2, 0)
     # What the thorough search asserts as well is not the shortcut's fault.
     first = found["limits"][0]
-    assert (first["shortcut_wrong"], first["other_pose"], first["not_good"]) == (1, 1, 0)
-    assert (found["pairs"], found["thorough_wrong"]) == (5, 4)
+    assert (first["wrong_by_both"], first["other_pose"], first["not_sure"]) == (2, 2, 2)
+    assert (found["pairs"], found["pairs_of_all"], found["sure"]) == (10, 5, 4)
+    assert (found["sure_wrong"], found["sure_and_clear"]) == (3, 2)
 
 
 def test_quick_runs_tell_stages_and_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
