@@ -12,6 +12,8 @@ from benchmarks.kept import Record
 from benchmarks.results import DOCS, read_results
 from benchmarks.seeds import spent_among
 
+QUICK_ONLY = {"good": True, "score": 0.5, "margin": 0.9, "right": True}
+
 
 def a_run(scans: int, loop: float = 1.0) -> dict[str, Any]:
     """Pairs grow with the square, the start not at all; a slow machine is slow at all of it."""
@@ -47,7 +49,7 @@ def test_limits_count_what_is_clear_and_wrong():
         *(a_pair(0.5, 0.45, right=False, same=False), a_pair(0.5, 0.65, right=False)),
         {**a_pair(0.9, 1.0, right=False), "good": False},
     ]
-    records = [Record(unit={"all": of}, result={"pairs": pairs}) for of in (False, True)]
+    records = [Record(unit={"thorough": of}, result={"pairs": pairs}) for of in ("good", "all")]
     found = clear.over_limits(records)
     told = {(a["score"], a["margin"]): (a["clear"], a["wrong"]) for a in found["limits"]}
     assert told[1.0, 1.0] == (8, 6) and told[2.0, 1.0] == (6, 4)
@@ -55,7 +57,10 @@ def test_limits_count_what_is_clear_and_wrong():
     # What the thorough search asserts as well is not the shortcut's fault.
     first = found["limits"][0]
     assert (first["wrong_by_both"], first["other_pose"], first["not_sure"]) == (2, 2, 2)
+    assert (first["both"], first["wrong_of_both"]) == (8, 6)
     assert (found["pairs"], found["pairs_of_all"], found["sure"]) == (10, 5, 4)
+    alone = clear.over_limits([Record(unit={"thorough": "none"}, result={"pairs": [QUICK_ONLY]})])
+    assert (alone["limits"][0]["clear"], alone["limits"][0]["both"], alone["sure"]) == (1, 0, 0)
     assert (found["sure_wrong"], found["sure_and_clear"]) == (3, 2)
 
 
