@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-fast test-benchmarks lint docs clean benchmarks paper trust calibration
+.PHONY: demo test test-fast test-benchmarks lint docs clean benchmarks paper trust calibration speed
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py demo
@@ -54,6 +54,11 @@ trust: $(VENV)/.installed-bench
 calibration: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks.calibration $(CALIBRATION)
 	$(BIN)/python -m benchmarks.trust --pages
+
+# CPU seconds of runs, beside a fixed loop and Open3D, into docs/performance.md; needs the data and a
+# quiet machine, takes an hour. Only to see that it works: make speed SPEED="--quick --out speed"
+speed: $(VENV)/.installed-bench
+	$(BIN)/python -m benchmarks.speed $(SPEED)
 
 clean:
 	rm -rf $(VENV) demo site
