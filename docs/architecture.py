@@ -26,7 +26,7 @@ LAYERS = (
     ("evidence", "heat", "refinement", "preparation", "work", "io"),
     ("contours",),
     ("geometry", "config"),
-    ("errors",),
+    ("errors", "choices", "compiled"),
 )
 """The rooms, from the top to the bottom. A room imports from the layers below its own alone."""
 

@@ -41,5 +41,5 @@ def run_twice(scans: Sequence[scanweld.RangeScan]) -> None:
 if __name__ == "__main__":
     with TemporaryDirectory() as folder:
         scans = Path(folder) / "scans"
-        scanweld.simulate(scanweld.creature(voxels=70), scans, num_scans=4, pixels=120)
+        scanweld.simulate(scanweld.creature(voxels=70), scans, num_scans=6, pixels=180)
         run_twice(scanweld.read_scans(scans))

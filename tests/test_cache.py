@@ -110,9 +110,9 @@ def test_the_command_tells_and_clears(
     FileCache(cache_folder(Path("model"))).put("ab", np.zeros(250_000))
     (tmp_path / "mine").write_text("mine")
     assert scanweld("cache", "info") == 0
-    assert capsys.readouterr().out == ".scanweld-cache: 1 records kept, 2.0 MB\n"
+    assert capsys.readouterr().out == ".scanweld-cache: 1 record kept, 2.0 MB\n"
     assert scanweld("cache", "clear", tmp_path) == 0
-    assert "1 records removed" in capsys.readouterr().out
+    assert "1 record removed" in capsys.readouterr().out
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
     assert scanweld("cache", "clear") == 0
     assert "0 records removed" in capsys.readouterr().out

@@ -27,8 +27,8 @@ SAYS = {
         r"(?s)\A(?!.*^component in .*^component in ).*^component in the frame of ",
     ),
     "04_correct_and_resume.py": (
-        r"\Afirst (good|doubtful): 4 scans are placed",
-        r"\b10 pieces of work were found again",
+        r"\Afirst good: 6 scans are placed",
+        r"\b15 pieces of work were found again",
         r"apart scan_\d\d scan_\d\d: contradicted",
     ),
     "05_fuse_known_poses.py": (r"\b([5-9]\d{3}|\d{5,}) faces",),

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
-from scanweld.work import kernels, source
-from scanweld.work.kernels import provide_cache
+import scanweld
+from scanweld.compiled import kernels, source
+from scanweld.compiled.kernels import provide_cache
 
 # Numba tries a folder by a temporary file in it; here all but our own are read-only.
 READ_ONLY = """
@@ -45,7 +46,7 @@ def twice(x):
 """
 
 ASK = """
-import scanweld.work.kernels
+import scanweld.compiled.kernels
 from scanweld.caller import total
 print(total(10), len(total.stats.cache_hits), len(total.stats.cache_misses))
 """
@@ -55,9 +56,9 @@ print(total(10), len(total.stats.cache_hits), len(total.stats.cache_misses))
 def package(tmp_path: Path) -> Path:
     """A package with our way to keep kernels, and two kernels in two files."""
     package = tmp_path / "scanweld"
-    (package / "work").mkdir(parents=True)
+    (package / "compiled").mkdir(parents=True)
     for name in ("__init__.py", "kernels.py", "source.py"):
-        shutil.copy(source.PACKAGE / "work" / name, package / "work")
+        shutil.copy(source.PACKAGE / "compiled" / name, package / "compiled")
     (package / "__init__.py").touch()
     (package / "caller.py").write_text(CALLER, encoding="utf-8")
     (package / "callee.py").write_text(CALLEE, encoding="utf-8")
@@ -96,8 +97,31 @@ def test_the_digest_covers_what_kernels_import_and_nothing_else():
     assert not any(name.startswith(("app/", "pipeline/")) for name in found)
 
 
+@pytest.mark.parametrize(
+    "code", ["import scanweld", "from scanweld.app.cli import main; main(['--help'])"]
+)
+def test_nothing_heavy_is_imported_before_it_is_needed(code: str):
+    tell = f"import atexit, sys; atexit.register(lambda: print(*sys.modules)); {code}"
+    done = subprocess.run([sys.executable, "-c", tell], capture_output=True, text=True)
+    assert not {"numba", "scipy", "numpy", "pydantic", "rich"} & set(done.stdout.split())
+
+
+def test_all_kernels_are_made_where_it_is_known_in_which_folder_they_are_kept():
+    named = [path for path in source.PACKAGE.rglob("*.py") if b"from numba" in path.read_bytes()]
+    assert named == [source.PACKAGE / "compiled/kernels.py"]
+
+
+def test_all_that_is_public_is_there():
+    assert {name for name in scanweld.__all__ if not hasattr(scanweld, name)} == set()
+    named = [name for names in vars(scanweld)["_MODULES"].values() for name in names.split()]
+    assert sorted(named) == scanweld.__all__ and set(named) < set(dir(scanweld))
+    assert scanweld.__version__
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        scanweld.nothing  # noqa: B018
+
+
 def test_scanweld_can_be_imported_where_kernels_cannot_be_kept():
-    code = READ_ONLY + "import scanweld, numba; print(numba.config.CACHE_DIR)"
+    code = READ_ONLY + "import scanweld.io, numba; print(numba.config.CACHE_DIR)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "NUMBA_CACHE_DIR" in done.stderr
     folder = Path(done.stdout.strip())

@@ -62,7 +62,8 @@ def test_poses(tmp_path: Path, result: Reconstruction):
 
 def test_graph(result: Reconstruction):
     pairs = graph_json(result)["pairs"]
-    keys = "i j kind accepted reason i_from_j score overlap evidence margin observability sliding"
+    keys = "i j kind accepted reason i_from_j score overlap evidence margin observability sliding "
+    keys += "searched"
     for pair in pairs:
         assert set(pair) == {*keys.split(), "confidence", "grounds", "alternatives", "passed_over"}
     named = [("scan_1", "scan_2"), ("scan_1", "scan_10"), ("scan_10", "überzählig")]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanweld.app.export import PoseFormat
+from scanweld.app.options import PoseFormat
 from scanweld.errors import InputError, ReadError, ScanweldError, WriteError
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, random_rotation

@@ -79,10 +79,10 @@ def test_stages_start_and_finish_in_turn_and_scans_are_refused_as_it_happens(
                 current = ""
             case ScanRefused():
                 pass
-    stages = "prepare", "features", "lay out", "pairs", "graph", "refine", "confidence", "fuse"
-    assert tuple(finished) == stages
+    found = "prepare", "lay out", "pairs", "features", "search", "graph", "refine"
+    assert tuple(finished) == (*found, "confidence", "fuse")
     pairs = next(e for e in events if isinstance(e, StageFinished) and e.stage == "pairs")
-    assert pairs.counts == {"pairs": 6}
+    assert pairs.counts == {"pairs": 6, "placed": 3}
     told = refused(events)
     assert told == dict(result.unplaced) and {"large", "twice"} <= set(told)
     assert sum(isinstance(event, ScanRefused) for event in events) == len(told)
@@ -156,7 +156,7 @@ def test_without_a_terminal_there_are_plain_lines(folder: Path, capsys: pytest.C
     lines = err.splitlines()
     assert ESCAPE not in out + err and all(line.startswith("scanweld: ") for line in lines)
     assert [line for line in lines if "refused broken" in line] == lines[:1]
-    assert any(line.startswith("scanweld: pairs: pairs 1 (") for line in lines)
+    assert any(line.startswith("scanweld: pairs: pairs 1, placed ") for line in lines)
 
 
 def test_on_a_terminal_there_is_a_bar_for_each_stage():

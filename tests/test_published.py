@@ -26,7 +26,7 @@ REPAIRED = PAPER.model_copy(update={"coarse": CoarseConfig(start="evidence", tri
 
 @lru_cache
 def scene() -> Scene:
-    return creature_scene(8, pixels=140, noise=MILD_NOISE, seed=8)
+    return creature_scene(8, pixels=170, noise=MILD_NOISE, seed=8)
 
 
 def three() -> Sequence[RangeScan]:

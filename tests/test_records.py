@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from scanweld.app.cache import KEPT
+from scanweld.compiled import source
 from scanweld.evidence.slippage import Slide, Slippage
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.pairs.symmetry import Likeness, Symmetry
-from scanweld.work import source, stage_log
+from scanweld.work import stage_log
 from scanweld.work.records import RecordError, Records
 from scanweld.work.stage_log import work_key
 from tests.results import EVIDENCE

@@ -37,11 +37,12 @@ def test_there_are_about_two_triangles_for_each_point_of_distinct_surface(times:
 
 def test_scans_finer_than_voxels_may_be_are_told(caplog: pytest.LogCaptureFixture):
     scans, _ = scanned(sphere(RADIUS))
-    coarse = FusionConfig(max_voxels_across=50)
+    wanted = FusionConfig(max_voxels_across=50, voxel_resolutions=0.5)
     with caplog.at_level(logging.WARNING):
-        assert voxel_edge(scans, coarse) == pytest.approx(scans[0].diameter / 50, rel=0.01)
+        assert voxel_edge(scans, wanted) == pytest.approx(scans[0].diameter / 50, rel=0.01)
     (told,) = caplog.messages
     enough = int(told.split("max_voxels_across to ")[1].split()[0])
     caplog.clear()
-    assert voxel_edge(scans, FusionConfig(max_voxels_across=enough)) < scans[0].diameter / 50
+    finer = wanted.model_copy(update={"max_voxels_across": enough})
+    assert voxel_edge(scans, finer) < scans[0].diameter / 50
     assert not caplog.messages

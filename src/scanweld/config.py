@@ -11,13 +11,10 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from scanweld.choices import Component, Holes, Method, Unit
 from scanweld.errors import ConfigError
 
-Unit = Literal["m", "cm", "mm", "in"]
-Method = Literal["robust", "paper"]
 Positive = Annotated[float, Field(gt=0)]
-Holes = Literal["open", "fill", "carve"]
-Component = Literal["largest", "all"]
 Count = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(gt=0, le=1)]
 Pruning = Literal["self-occlusion", "observed", "predicted"]

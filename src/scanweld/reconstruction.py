@@ -54,7 +54,7 @@ class ScanReport:
         viewpoint: How it is known where the sensor stood.
         notes: What was assumed.
         content_hash: Hash of the scan's content; None if it could not be read.
-        num_keypoints: PA-HKS keypoints.
+        num_keypoints: PA-HKS keypoints; None where nothing asked for them.
         edges: Names of the scans it has an accepted pair with.
         overlap: Largest share of its samples that agree with one other placed scan; None if
             unplaced.
@@ -75,7 +75,7 @@ class ScanReport:
     viewpoint: Viewpoint = Viewpoint.UNKNOWN
     notes: tuple[str, ...] = ()
     content_hash: str | None = None
-    num_keypoints: int = 0
+    num_keypoints: int | None = None
     edges: tuple[str, ...] = ()
     overlap: float | None = None
     rms: float | None = None
@@ -117,6 +117,8 @@ class PairReport:
         margin: Share of the score by which it beats the best distinct rival.
         observability: Smallest over largest eigenvalue of its information.
         sliding: What the surfaces slide like on each other, if the pair is a sliding one.
+        searched: Whether all poses were tried. If not, its pose came from a quick search or from
+            other pairs, and its margin is over the rivals that were seen on the way.
         alternatives: All distinct poses kept, best first.
         passed_over: Poses that fit as well but for a small mark, which decides against them.
         confidence: Probability that i_from_j is right; 0 where nothing fits.
@@ -135,6 +137,7 @@ class PairReport:
     margin: float
     observability: float
     sliding: Slide | None = None
+    searched: bool = True
     alternatives: tuple[AlternativeReport, ...] = ()
     passed_over: tuple[AlternativeReport, ...] = ()
     confidence: float = 0.0

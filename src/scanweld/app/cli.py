@@ -6,25 +6,18 @@ than good, 130 interrupted.
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from scanweld.app.model_commands import cache, export, fuse, report, run
+from scanweld.app import cache_commands
+from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
 from scanweld.app.options import NOT_GOOD
 from scanweld.errors import BudgetError, KnowledgeError, ScanweldError
-from scanweld.evaluation.comparison import compare, comparison_table
-from scanweld.evaluation.metrics import Standing
-from scanweld.evaluation.scanner import NoiseModel
-from scanweld.evaluation.simulate import TYPICAL_NOISE
-from scanweld.evaluation.simulate import simulate as make_scans
-from scanweld.geometry.camera import CameraModel
-from scanweld.io import collect, read_mesh, read_scan
-from scanweld.preparation.info import describe_scan
+
+# What only one command needs is imported inside it: help and small commands then start at once.
 
 ERROR = 1
 USAGE = 2
@@ -46,6 +39,9 @@ def info(
     ],
 ) -> None:
     """Show what was read from scan files, and what was assumed."""
+    from scanweld.io import collect, read_scan
+    from scanweld.preparation.info import describe_scan
+
     failed = False
     for file in collect(files):
         try:
@@ -68,10 +64,18 @@ def simulate(
     noise: Annotated[
         float,
         typer.Option(min=0, max=0.1, help="Of depth, in object diameters; 0 for perfect scans."),
-    ] = TYPICAL_NOISE.depth_diameters,
+    ] = 5e-4,  # that of TYPICAL_NOISE
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
 ) -> None:
     """Scan a mesh with a virtual scanner; the true poses go to truth/poses.json."""
+    from dataclasses import replace
+
+    from scanweld.evaluation.scanner import NoiseModel
+    from scanweld.evaluation.simulate import TYPICAL_NOISE
+    from scanweld.evaluation.simulate import simulate as make_scans
+    from scanweld.geometry.camera import CameraModel
+    from scanweld.io import read_mesh
+
     model = CameraModel[camera.upper()]
     noisy = replace(TYPICAL_NOISE, depth_diameters=noise) if noise else NoiseModel()
     truth = make_scans(
@@ -95,6 +99,9 @@ def evaluate(
     ] = [],  # noqa: B006
 ) -> None:
     """Compare poses with the truth; exit code 3 unless all scans are right."""
+    from scanweld.evaluation.comparison import compare, comparison_table
+    from scanweld.evaluation.metrics import Standing
+
     errors = compare(estimate, truth, scans)
     typer.echo(comparison_table(errors))
     raise typer.Exit(0 if errors.count(Standing.RIGHT) == len(errors.scans) else NOT_GOOD)
@@ -102,7 +109,7 @@ def evaluate(
 
 app.command()(fuse)
 app.command()(export)
-app.add_typer(cache, name="cache")
+app.add_typer(cache_commands.app, name="cache")
 
 
 def _print_error(error: ScanweldError) -> None:
@@ -110,6 +117,8 @@ def _print_error(error: ScanweldError) -> None:
 
 
 def _print_version(wanted: bool) -> None:
+    from importlib.metadata import version
+
     if wanted:
         typer.echo(f"scanweld {version('scanweld')}")
         raise typer.Exit()

@@ -1,16 +1,12 @@
 """A model in the formats of other tools: its poses, its surface and its points."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
-import typer
 
 from scanweld.app.model_folder import ModelFolder, open_model
-from scanweld.app.options import MovedScans, UnitOption
+from scanweld.app.options import Wanted
 from scanweld.app.workspace import Workspace
 from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
@@ -23,61 +19,8 @@ from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.sensor import locate_sensor
 
-Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
-
 NO_COLOR = 128
 """Grey of points whose scan has no colours where others have."""
-
-
-class PoseFormat(StrEnum):
-    """Formats of poses."""
-
-    CONF = "conf"
-    MLP = "mlp"
-    ALN = "aln"
-    TUM = "tum"
-    COLMAP = "colmap"
-    OPEN3D = "open3d"
-    CLOUDCOMPARE = "cloudcompare"
-    NERFSTUDIO = "nerfstudio"
-
-
-class MeshFormat(StrEnum):
-    """Formats of meshes."""
-
-    PLY = "ply"
-    OBJ = "obj"
-    STL = "stl"
-    GLB = "glb"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """What is to be exported, from where; also options of the command.
-
-    Attributes:
-        poses: Names of formats of poses.
-        model: Names of formats of meshes.
-        points: Name of a PLY file of all points.
-        scans: The scans, where they are no longer where the model says.
-        component: Which component, from 1; only the first has a mesh.
-        unit: Of the scans, where the model does not say.
-        up: The model's axis that points up, for GLB.
-    """
-
-    poses: Annotated[list[PoseFormat], typer.Option(help="Poses; may be repeated.")] = field(
-        default_factory=list
-    )
-    model: Annotated[list[MeshFormat], typer.Option(help="The mesh; may be repeated.")] = field(
-        default_factory=list
-    )
-    points: Annotated[
-        str | None, typer.Option(metavar="NAME.ply", help="All points, with their scan's number.")
-    ] = None
-    scans: MovedScans = field(default_factory=list)
-    component: Annotated[int, typer.Option(min=1, help="Which component, if several.")] = 1
-    unit: UnitOption = None
-    up: Annotated[Axis, typer.Option(help="The model's axis that points up, for GLB.")] = "y"
 
 
 def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -> list[str]:

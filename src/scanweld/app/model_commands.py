@@ -2,18 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scanweld.app.cache import NAME as CACHE_NAME
-from scanweld.app.cache import CacheSize, FileCache, cache_folder
-from scanweld.app.export import Wanted
-from scanweld.app.export import export as export_model
-from scanweld.app.fuse import fuse_job
-from scanweld.app.job import Limits, report_job, run_job
-from scanweld.app.memory import parse_size
-from scanweld.app.named_pairs import named_pairs
 from scanweld.app.options import (
     ConfigFile,
     Force,
@@ -23,12 +15,16 @@ from scanweld.app.options import (
     ShowOptions,
     SurfaceOptions,
     UnitOption,
+    Wanted,
     Workers,
     takes,
 )
-from scanweld.config import Method, load_config
-from scanweld.io import read_poses
-from scanweld.knowledge.facts import Knowledge, read_knowledge
+from scanweld.choices import Method
+
+if TYPE_CHECKING:
+    from scanweld.knowledge.facts import Knowledge
+
+# What the commands do is imported inside them: help then starts at once.
 
 INTERRUPTED = 130
 
@@ -62,8 +58,12 @@ class FactOptions:
         bool, typer.Option("--turntable", help="All scans turn about one, unknown axis.")
     ] = False
 
-    def known(self) -> Knowledge:
+    def known(self) -> "Knowledge":
         """The facts of the options and of the file."""
+        from scanweld.app.named_pairs import named_pairs
+        from scanweld.io import read_poses
+        from scanweld.knowledge.facts import Knowledge, read_knowledge
+
         told = Knowledge(
             fix=tuple(self.fix or ()),
             start=None if self.start is None else read_poses(self.start),
@@ -110,6 +110,11 @@ class RunOptions:
 @takes(RunOptions)
 def run(options: RunOptions) -> None:
     """Register and fuse scans: poses, a model and a verdict."""
+    from scanweld.app.cache import cache_folder
+    from scanweld.app.job import Limits, run_job
+    from scanweld.app.memory import parse_size
+    from scanweld.config import load_config
+
     output, memory = options.output, options.memory
     fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
     settings = load_config(options.config, unit=options.unit, method=options.method, fusion=fusion)
@@ -161,6 +166,9 @@ class FuseOptions:
 @takes(FuseOptions)
 def fuse(options: FuseOptions) -> None:
     """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
+    from scanweld.app.fuse import fuse_job
+    from scanweld.config import load_config
+
     settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
     with options.show.reporting() as progress:
         result = fuse_job(
@@ -182,6 +190,8 @@ def report(
     scans: MovedScans = [],  # noqa: B006
 ) -> None:
     """Write report.html of a finished model folder anew."""
+    from scanweld.app.job import report_job
+
     typer.echo(report_job(model, scans))
 
 
@@ -198,28 +208,7 @@ class ExportOptions:
 @takes(ExportOptions)
 def export(options: ExportOptions) -> None:
     """Write a model, its poses and points in the formats of other tools."""
+    from scanweld.app.export import export as export_model
+
     lines = export_model(options.model_dir, options.output, options.wanted, force=options.force)
     typer.echo("\n".join(lines))
-
-
-cache = typer.Typer(
-    help="Finished work that runs keep beside their outputs.", rich_markup_mode=None
-)
-Place = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Where models were made.")]
-
-
-@cache.command("info")
-def cache_info(folder: Place = Path()) -> None:
-    """Show how much is kept."""
-    typer.echo(_told(folder, FileCache(folder / CACHE_NAME).size(), "kept"))
-
-
-@cache.command("clear")
-def cache_clear(folder: Place = Path()) -> None:
-    """Remove all that is kept: nothing but time is lost."""
-    typer.echo(_told(folder, FileCache(folder / CACHE_NAME).clear(), "removed"))
-
-
-def _told(folder: Path, size: CacheSize, what: str) -> str:
-    megabytes = size.bytes / 1e6
-    return f"{folder / CACHE_NAME}: {size.records} records {what}, {megabytes:.1f} MB"

@@ -2,20 +2,20 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, Signature
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
-from scanweld.app.json_lines import finished_line
-from scanweld.app.progress import reporting
-from scanweld.app.summary import summary
-from scanweld.config import Holes, Unit
-from scanweld.reconstruction import Reconstruction
-from scanweld.work.progress import Progress
+from scanweld.choices import Holes, Unit
+
+if TYPE_CHECKING:
+    from scanweld.reconstruction import Reconstruction
+    from scanweld.work.progress import Progress
 
 NOT_GOOD = 3
 """Exit code of a result that is less than it could be."""
@@ -31,6 +31,30 @@ Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if 
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
 UnitOption = Annotated[Unit | None, typer.Option(help="Unit of the scans' coordinates.")]
 MovedScans = Annotated[list[str], typer.Option(help="The scans, if they have been moved since.")]
+
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+class PoseFormat(StrEnum):
+    """Formats of poses."""
+
+    CONF = "conf"
+    MLP = "mlp"
+    ALN = "aln"
+    TUM = "tum"
+    COLMAP = "colmap"
+    OPEN3D = "open3d"
+    CLOUDCOMPARE = "cloudcompare"
+    NERFSTUDIO = "nerfstudio"
+
+
+class MeshFormat(StrEnum):
+    """Formats of meshes."""
+
+    PLY = "ply"
+    OBJ = "obj"
+    STL = "stl"
+    GLB = "glb"
 
 
 def takes(kind: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
@@ -55,23 +79,21 @@ def takes(kind: type[Options]) -> Callable[[Callable[[Options], None]], Callable
 
 
 def _parameters(kind: Any) -> Iterator[Parameter]:
-    for field in fields(kind):
-        if is_dataclass(field.type):
-            yield from _parameters(field.type)
+    for each in fields(kind):
+        if is_dataclass(each.type):
+            yield from _parameters(each.type)
             continue
-        default = Parameter.empty if field.default is MISSING else field.default
-        if field.default_factory is not MISSING:
-            default = field.default_factory()
-        yield Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=field.type)
+        default = Parameter.empty if each.default is MISSING else each.default
+        if each.default_factory is not MISSING:
+            default = each.default_factory()
+        yield Parameter(each.name, Parameter.KEYWORD_ONLY, default=default, annotation=each.type)
 
 
 def _filled(kind: Any, given: Mapping[str, Any]) -> Any:
     return kind(
         **{
-            field.name: _filled(field.type, given)
-            if is_dataclass(field.type)
-            else given[field.name]
-            for field in fields(kind)
+            each.name: _filled(each.type, given) if is_dataclass(each.type) else given[each.name]
+            for each in fields(kind)
         }
     )
 
@@ -119,11 +141,45 @@ class ShowOptions:
     )
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A detailed log.")] = False
 
-    def reporting(self) -> AbstractContextManager[Progress]:
+    def reporting(self) -> "AbstractContextManager[Progress]":
         """Shows progress for as long as the context lasts."""
+        from scanweld.app.progress import reporting
+
         return reporting(quiet=self.quiet, verbose=self.verbose, as_json=self.as_json)
 
-    def finish(self, result: Reconstruction, output: Path) -> None:
+    def finish(self, result: "Reconstruction", output: Path) -> None:
         """Print the verdict, and leave with its exit code."""
+        from scanweld.app.json_lines import finished_line
+        from scanweld.app.summary import summary
+
         typer.echo((finished_line if self.as_json else summary)(result, output))
         raise typer.Exit(result.verdict.exit_code)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is to be exported, from where; also options of the command.
+
+    Attributes:
+        poses: Names of formats of poses.
+        model: Names of formats of meshes.
+        points: Name of a PLY file of all points.
+        scans: The scans, where they are no longer where the model says.
+        component: Which component, from 1; only the first has a mesh.
+        unit: Of the scans, where the model does not say.
+        up: The model's axis that points up, for GLB.
+    """
+
+    poses: Annotated[list[PoseFormat], typer.Option(help="Poses; may be repeated.")] = field(
+        default_factory=list
+    )
+    model: Annotated[list[MeshFormat], typer.Option(help="The mesh; may be repeated.")] = field(
+        default_factory=list
+    )
+    points: Annotated[
+        str | None, typer.Option(metavar="NAME.ply", help="All points, with their scan's number.")
+    ] = None
+    scans: MovedScans = field(default_factory=list)
+    component: Annotated[int, typer.Option(min=1, help="Which component, if several.")] = 1
+    unit: UnitOption = None
+    up: Annotated[Axis, typer.Option(help="The model's axis that points up, for GLB.")] = "y"

@@ -87,6 +87,7 @@ def _pair(pair: PairReport) -> Json:
         "margin": pair.margin,
         "observability": pair.observability,
         "sliding": pair.sliding,
+        "searched": pair.searched,
         "grounds": dict(pair.grounds),
         "alternatives": [
             {"i_from_j": _matrix(other.i_from_j), "score": other.score, "weight": other.weight}

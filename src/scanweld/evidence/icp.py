@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.step import move, solve_damped
 from scanweld.geometry.arrays import FloatArray

@@ -1,8 +1,8 @@
 """A damped Gauss-Newton step on a pose row (12,), compiled: thousands of poses take many each."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray
 
 DAMPING = 1e-3

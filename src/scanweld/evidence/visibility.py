@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import (
     RASTER_DEPTH,

@@ -4,10 +4,10 @@ import logging
 
 import fast_simplification
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array, diags_array
 from scipy.spatial import KDTree
 
+from scanweld.compiled.kernels import njit
 from scanweld.config import Component
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import (

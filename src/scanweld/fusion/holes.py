@@ -13,9 +13,9 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from scipy.ndimage import map_coordinates
 
+from scanweld.compiled.kernels import njit
 from scanweld.fusion.integrate import add_images
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.volume import (

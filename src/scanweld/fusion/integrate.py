@@ -7,8 +7,8 @@ distances are taken to the tangent plane of the pixel, and space seen empty only
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import InputError
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import plane_distance, project, smooth_distance

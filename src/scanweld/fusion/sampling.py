@@ -5,8 +5,8 @@ pixel and exact on planes; on a rim, where the four may not be of one surface, t
 """
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.prepared import MIN_COSINE

@@ -1,8 +1,8 @@
 """Double layers of a surface: two sheets that face the same way, one close behind the other."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.fusion.agreement import Agreement
 from scanweld.fusion.finish import split_fans
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray

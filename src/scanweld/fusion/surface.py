@@ -1,8 +1,8 @@
 """From signed distances to triangles, where there are distances."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.fusion.cases import corner_offsets, edge_corners, triangle_table
 from scanweld.fusion.posed_image import SingleArray
 from scanweld.fusion.volume import BLOCK, KEY_BITS, Volume

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.fusion.posed_image import SingleArray
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.grid import GAP_ROUNDS

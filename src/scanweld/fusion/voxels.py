@@ -35,7 +35,7 @@ def voxel_edge(scans: Sequence[PreparedScan], config: FusionConfig) -> float:
     spacing = float(np.quantile([surface_spacing(scan) for scan in scans], _FINE_SHARE))
     resolved = config.voxel_resolutions * _VOXEL_SPACINGS * spacing
     finest = _finest(scans, config)
-    if resolved < finest:
+    if finest**2 > 2.0 * resolved**2:  # Less than half of the triangles are left.
         logger.warning(
             "the scans resolve voxels of %.3g, but the model's are %.3g, %d across: set "
             "max_voxels_across to %d for all of their detail",

@@ -1,8 +1,8 @@
 """Points sorted into hashed cubes of space, for compiled searches within a small radius."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 

@@ -1,8 +1,8 @@
 """Triangles between neighbouring cells of a grid, cut at depth jumps."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray, IntArray
 
 GAP_ROUNDS = 2

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
 
 MIN_PIECE_SHARE = 0.002

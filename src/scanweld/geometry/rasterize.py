@@ -1,8 +1,8 @@
 """A z-buffer: which triangle a camera sees in each pixel, and how far away it is."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 

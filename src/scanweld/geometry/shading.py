@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals

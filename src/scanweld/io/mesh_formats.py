@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.io.raw import RawScan, fan_triangles, to_bytes
@@ -173,8 +174,44 @@ def _off_faces(path: Path, rows: list[tuple[int, list[bytes]]]) -> IntArray | No
 
 def _merged(corners: FloatArray) -> tuple[FloatArray, IntArray]:
     """Different points in the order of their first appearance, and each corner's index."""
-    _, first, inverse = np.unique(corners + 0.0, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank: NDArray = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return corners[first[order]], rank[inverse.reshape(-1)]
+    table = np.full(1 << (2 * len(corners) + 1).bit_length(), -1, dtype=np.int64)
+    words = (corners + 0.0).view(np.uint64)
+    first, index = _first_alike(corners, words, table)
+    return corners[first], index
+
+
+@njit(cache=True, nogil=True)
+def _first_alike(
+    points: FloatArray, words: NDArray[np.uint64], table: IntArray
+) -> tuple[IntArray, IntArray]:  # pragma: no cover - compiled
+    """Where each different point (D,) appears first, and which of them each point (N,) is.
+
+    Args:
+        points: (N, 3); NaN is like nothing.
+        words: (N, 3) their bits, the same for like ones.
+        table: (2^k,) with more than N entries, all -1.
+    """
+    first, index = np.empty(len(points), dtype=np.int64), np.empty(len(points), dtype=np.int64)
+    count = 0
+    for i in range(len(points)):
+        x, y, z = points[i]
+        place, found = 0, -1
+        if x == x and y == y and z == z:
+            bits = words[i, 0] * np.uint64(0x9E3779B97F4A7C15) ^ words[i, 1]
+            bits = (bits ^ (bits >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9) ^ words[i, 2]
+            bits = (bits ^ (bits >> np.uint64(32))) * np.uint64(0x94D049BB133111EB)
+            place = np.int64((bits ^ (bits >> np.uint64(31))) & np.uint64(len(table) - 1))
+            while table[place] >= 0:
+                k = first[table[place]]
+                if points[k, 0] == x and points[k, 1] == y and points[k, 2] == z:
+                    found = table[place]
+                    break
+                place = (place + 1) & (len(table) - 1)
+            if found < 0:
+                table[place] = count
+        if found < 0:
+            found = count
+            first[count] = i
+            count += 1
+        index[i] = found
+    return first[:count], index

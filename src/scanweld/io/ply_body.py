@@ -1,14 +1,12 @@
 """The body of a PLY file, decoded in bulk: ASCII and both binary orders by the same code."""
 
-import struct
 import sys
-from array import array
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, IntArray
 from scanweld.io.ply_header import PlyElement, PlyHeader, PlyProperty
@@ -60,11 +58,15 @@ def decode_body(header: PlyHeader, data: bytes) -> dict[str, Columns]:
     return tables
 
 
+_TOO_SHORT, _NO_LENGTH = -1, -2
+_FLOAT, _SIGNED = ord("f"), ord("i")
+
+
 class _BodyError(Exception):
     """The body does not fit the header; caught above, where the file is known."""
 
-
-_TRUNCATED = "the body ends too early (truncated, or a wrong count)"
+    def __init__(self, what: str = "the body ends too early (truncated, or a wrong count)") -> None:
+        super().__init__(what)
 
 
 def _as_doubles(element: PlyElement) -> PlyElement:
@@ -86,15 +88,12 @@ def _decode_element(
     lengths = _first_lengths(element, order, body, start)
     row = _row_type(element, order, lengths)
     end = start + row.itemsize * element.count
-    has_lists = bool(lengths)
     if end <= len(body):
         rows = np.frombuffer(body, row, element.count, start)
         if _all_lengths_are(element, rows, lengths):
             return _uniform_columns(element, rows), end
-    if not has_lists:
-        raise _BodyError(_TRUNCATED)
-    if [prop.count_type for prop in element.properties] == ["u1"]:
-        return _short_columns(element, order, body, start)
+    if not lengths:
+        raise _BodyError
     return _ragged_columns(element, order, body, start)
 
 
@@ -105,6 +104,8 @@ def _empty(prop: PlyProperty) -> NDArray | Ragged:
 
 def _first_lengths(element: PlyElement, order: str, body: memoryview, start: int) -> list[int]:
     """Lengths of the first row's lists: most files have the same in every row."""
+    if not any(p.is_list for p in element.properties):
+        return []
     _, lengths, _ = _walk(replace(element, count=1), order, body, start)
     return [n for n, p in zip(lengths[0].tolist(), element.properties, strict=True) if p.is_list]
 
@@ -156,86 +157,92 @@ def _walk(
 ) -> tuple[IntArray, IntArray, int]:
     """Byte offsets and lengths (rows, properties) of all values, and the element's end."""
     sizes = [np.dtype(p.type).itemsize for p in element.properties]
-    readers = [
-        struct.Struct(order + np.dtype(p.count_type).char) if p.count_type else None
-        for p in element.properties
-    ]
-    steps = list(zip(sizes, readers, strict=True))
-    begins, lengths = array("q"), array("d")
-    at = start
-    try:
-        for _ in range(element.count):
-            for size, reader in steps:
-                length = 1
-                if reader is not None:
-                    (length,) = reader.unpack_from(body, at)
-                    at += reader.size
-                begins.append(at)
-                lengths.append(length)
-                at += size * int(length)
-    except (struct.error, ValueError, OverflowError) as error:
-        raise _BodyError(_TRUNCATED) from error
-    if not start <= at <= len(body):
-        raise _BodyError(_TRUNCATED)
-    told = np.frombuffer(lengths, np.float64)
-    counts = told.astype(np.int64)
-    if (counts != told).any() or counts.min() < 0:
-        raise _BodyError("a list's length is not a whole number from 0 up")
-    shape = (element.count, len(steps))
-    return np.frombuffer(begins, np.int64).reshape(shape), counts.reshape(shape), at
-
-
-def _short_columns(
-    element: PlyElement, order: str, body: memoryview, start: int
-) -> tuple[Columns, int]:
-    """Rows of one list each, whose length is a byte: faces and range grids, often millions."""
-    (prop,) = element.properties
-    dtype = np.dtype(order + prop.type)
+    codes = [p.count_type or "" for p in element.properties]  # such as u1
+    count_sizes = [int(code[1:] or 0) for code in codes]
+    kinds = [ord(code[0]) if code else 0 for code in codes]
+    least = sum(count or size for count, size in zip(count_sizes, sizes, strict=True))
+    if element.count * least > len(body) - start:
+        raise _BodyError
+    layout = np.array([sizes, count_sizes, kinds])
     octets = np.frombuffer(body, np.uint8)
-    lengths, end = _short_lengths(octets, start, element.count, dtype.itemsize)
-    if end > len(body):
-        raise _BodyError(_TRUNCATED)
-    values = _short_values(octets, start, lengths, dtype.itemsize).view(dtype)
-    return {prop.name: Ragged(lengths, values)}, end
-
-
-@njit(cache=True, nogil=True)
-def _short_lengths(
-    octets: ByteArray, start: int, count: int, size: int
-) -> tuple[ByteArray, int]:  # pragma: no cover - compiled
-    """Lengths (count,) of lists of values of a size, and where they end; past the end if cut."""
-    lengths = np.zeros(count, dtype=np.uint8)
-    at = start
-    for row in range(count):
-        if at >= len(octets):
-            return lengths, len(octets) + 1
-        lengths[row] = octets[at]
-        at += 1 + size * int(octets[at])
-    return lengths, at
-
-
-@njit(cache=True, nogil=True)
-def _short_values(
-    octets: ByteArray, start: int, lengths: ByteArray, size: int
-) -> ByteArray:  # pragma: no cover - compiled
-    """The octets of all values of such lists, one after the other."""
-    total = 0
-    for length in lengths:
-        total += size * int(length)
-    values = np.empty(total, dtype=np.uint8)
-    at, put = start, 0
-    for length in lengths:
-        step = size * int(length)
-        values[put : put + step] = octets[at + 1 : at + 1 + step]
-        at += 1 + step
-        put += step
-    return values
+    begins, lengths, end = _find_lists(octets, start, element.count, layout, order == ">")
+    if end == _TOO_SHORT:
+        raise _BodyError
+    if end == _NO_LENGTH:
+        raise _BodyError("a list's length is not a whole number from 0 up")
+    return begins, lengths, end
 
 
 def _gather(body: memoryview, begins: IntArray, lengths: IntArray, dtype: np.dtype) -> NDArray:
     """Values of all rows, one after the other, from the offsets where each row's begin."""
-    before = np.cumsum(lengths) - lengths
-    within = np.arange(int(lengths.sum())) - np.repeat(before, lengths)
-    offsets = np.repeat(begins, lengths) + dtype.itemsize * within
-    octets = np.frombuffer(body, np.uint8)[offsets[:, None] + np.arange(dtype.itemsize)]
-    return octets.reshape(-1).view(dtype)
+    size = dtype.itemsize
+    return _octets_of_lists(np.frombuffer(body, np.uint8), begins, size * lengths).view(dtype)
+
+
+@njit(cache=True, nogil=True)
+def _find_lists(
+    octets: ByteArray,
+    start: int,
+    count: int,
+    layout: IntArray,
+    is_big: bool,
+) -> tuple[IntArray, IntArray, int]:  # pragma: no cover - compiled
+    """Where values begin, and how many there are, in rows of scalars and lists.
+
+    Args:
+        octets: The body.
+        start: Where the first row begins.
+        count: Number of rows.
+        layout: (3, P), of each property: size of a value, size of the length, 0 for a scalar, and
+            NumPy's letter for the kind of the length's type.
+        is_big: Whether the most significant octet comes first.
+
+    Returns:
+        Begins and lengths (count, P), and where the last row ends, or what is wrong.
+    """
+    sizes, count_sizes, kinds = layout
+    begins = np.empty((count, len(sizes)), dtype=np.int64)
+    lengths = np.ones((count, len(sizes)), dtype=np.int64)
+    at, word = start, np.zeros(8, dtype=np.uint8)
+    single, double = word[:4].view(np.float32), word.view(np.float64)
+    for row in range(count):
+        for k in range(len(sizes)):
+            size, kind = count_sizes[k], kinds[k]
+            if at + size > len(octets):
+                return begins, lengths, _TOO_SHORT
+            if size > 0:
+                length = 0.0
+                for i in range(size):
+                    word[i] = octets[at + (size - 1 - i if is_big else i)]
+                if kind == _FLOAT:
+                    length = np.float64(single[0]) if size == 4 else double[0]
+                else:
+                    for i in range(size - 1, -1, -1):
+                        length = 256.0 * length + word[i]
+                    if kind == _SIGNED and word[size - 1] >= 128:
+                        length = -1.0
+                if not (length >= 0 and length == np.floor(length)):
+                    return begins, lengths, _NO_LENGTH
+                if length > len(octets):
+                    return begins, lengths, _TOO_SHORT
+                lengths[row, k] = np.int64(length)
+                at += size
+            begins[row, k] = at
+            at += sizes[k] * lengths[row, k]
+            if at > len(octets):
+                return begins, lengths, _TOO_SHORT
+    return begins, lengths, at
+
+
+@njit(cache=True, nogil=True)
+def _octets_of_lists(
+    octets: ByteArray, begins: IntArray, lengths: IntArray
+) -> ByteArray:  # pragma: no cover - compiled
+    """The octets of lists that begin somewhere (N,) and are so long (N,), one after the other."""
+    values = np.empty(lengths.sum(), dtype=np.uint8)
+    put = 0
+    for row in range(len(begins)):
+        for k in range(lengths[row]):
+            values[put + k] = octets[begins[row] + k]
+        put += lengths[row]
+    return values

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray
 from scanweld.io.raw import RawScan, to_bytes
-from scanweld.io.text import is_number, parse_numbers
+from scanweld.io.text import is_number, parse_numbers, words_per_line
 
 logger = logging.getLogger(__name__)
 
@@ -17,6 +17,8 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _SEPARATORS = bytes.maketrans(b",;", b"  ")
 _COMMENT = re.compile(rb"(^|\s)(#|//).*$", re.DOTALL)
 """Not inside a word: some libraries print NaN as 1.#QNAN."""
+_MIXED = re.compile(rb",[^\r\n]*;|;[^\r\n]*,")
+_FILLED_LINE = re.compile(rb"[^\r\n]*[^\s][^\r\n]*")
 _WIDTHS = (3, 4, 6, 7)
 
 
@@ -30,18 +32,17 @@ def read_xyz(path: Path, data: bytes) -> RawScan:
     Raises:
         ReadError: If a line, the number of columns or the number of points is wrong.
     """
-    lines = data.removeprefix(_BYTE_ORDER_MARK).splitlines()
-    lines = [_COMMENT.sub(b"", line) for line in lines]
-    if any(b"," in line and b";" in line for line in lines):
+    text = data.removeprefix(_BYTE_ORDER_MARK)
+    if b"#" in text or b"//" in text:
+        text = b"\n".join(_COMMENT.sub(b"", line) for line in text.splitlines())
+    if b"," in text and b";" in text and _MIXED.search(text):
         raise ReadError(
             f"{path}: commas and semicolons in one line; write decimals with a point and separate "
             "the numbers by either"
         )
-    lines = [line.translate(_SEPARATORS) for line in lines]
-    _drop_column_names(path, lines)
-    sizes = np.array([len(line.split()) for line in lines], dtype=np.int64)
-    promised = _take_count(path, lines, sizes)
-    table = _table(path, lines, sizes)
+    text = _without_column_names(path, text.translate(_SEPARATORS))
+    text, promised = _take_count(text)
+    table = _table(path, text)
     if promised is not None and promised != len(table):
         raise ReadError(
             f"{path}: holds {len(table)} points but says {promised} (truncated, or a wrong count); "
@@ -50,33 +51,32 @@ def read_xyz(path: Path, data: bytes) -> RawScan:
     return _raw_scan(path, table)
 
 
-def _drop_column_names(path: Path, lines: list[bytes]) -> None:
-    """Blank the first line that holds anything, if it is made of names such as x y z."""
-    first = next((k for k, line in enumerate(lines) if line.strip()), None)
-    if first is not None and not any(is_number(word) for word in lines[first].split()):
-        names = lines[first].decode(errors="replace").strip()
-        logger.info("%s: column names %r skipped", path, names)
-        lines[first] = b""
+def _without_column_names(path: Path, text: bytes) -> bytes:
+    """The text, the first line that holds anything blanked if it is made of names such as x y z."""
+    first = _FILLED_LINE.search(text)
+    if first is None or any(is_number(word) for word in first[0].split()):
+        return text
+    names = first[0].decode(errors="replace").strip()
+    logger.info("%s: column names %r skipped", path, names)
+    return text[: first.start()] + text[first.end() :]
 
 
-def _take_count(path: Path, lines: list[bytes], sizes: IntArray) -> int | None:
-    """The number of points where it stands first, alone in its line; blanks that line."""
-    filled = np.flatnonzero(sizes)
-    if len(filled) < 2 or sizes[filled[0]] != 1 or not lines[filled[0]].strip().isdigit():
-        return None
-    first = int(filled[0])
-    count = int(lines[first])
-    lines[first], sizes[first] = b"", 0
-    return count
+def _take_count(text: bytes) -> tuple[bytes, int | None]:
+    """The text and the number of points where it stands first, alone in its line; blanks that."""
+    first = _FILLED_LINE.search(text)
+    if first is None or not first[0].strip().isdigit() or not text[first.end() :].strip():
+        return text, None
+    return text[: first.start()] + text[first.end() :], int(first[0])
 
 
-def _table(path: Path, lines: list[bytes], sizes: IntArray) -> FloatArray:
+def _table(path: Path, text: bytes) -> FloatArray:
     """All numbers (N, columns)."""
+    sizes = words_per_line(text)
     filled = np.flatnonzero(sizes)
     if not len(filled):
         raise ReadError(f"{path}: holds no points; leave it out")
     # Before the widths: prose is better described by its first word than by their number.
-    numbers = parse_numbers(path, b"\n".join(lines))
+    numbers = parse_numbers(path, text)
     width = int(sizes[filled[0]])
     odd = filled[sizes[filled] != width]
     if len(odd):

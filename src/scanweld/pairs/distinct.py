@@ -1,8 +1,8 @@
 """Which of many scored poses are distinct: non-maximum suppression on rigid motions."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray, IntArray
 
 

@@ -8,9 +8,9 @@ soon as they speak clearly against it. The scores rank; what is kept is judged a
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scanweld.compiled.kernels import njit
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
 from scanweld.evidence.field import (
     RASTER_DEPTH,
@@ -35,7 +35,8 @@ Single = NDArray[np.float32]
 
 NUM_LOOKS = 64
 """Samples of each scan that the score of a hypothesis rests on."""
-LOOKS = np.array([[4, -0.6], [8, -0.4], [16, -0.33], [32, -0.25]])
+LOOK_AFTER = (4, 8, 16, 32)
+LOOK_FLOORS = (-0.6, -0.4, -0.33, -0.25)
 """After so many samples of each scan, a hypothesis scored below is given up. Of the real pairs that
 overlap by 5 %, the good hypotheses near the truth score at least -0.47, -0.25, -0.27, -0.12."""
 CELL_DIAMETERS = 0.01
@@ -120,7 +121,7 @@ def sweep(
     _score_all(
         *_coarse_image(i), *_seen_from(anchors_i, i), hung_i, anchors_i.points.astype(np.float32),
         *_coarse_image(j), *_seen_from(anchors_j, j), hung_j, anchors_j.points.astype(np.float32),
-        SWEEP_WEIGHTS, LOOKS, np.float32(tolerance), scores,
+        SWEEP_WEIGHTS, np.column_stack([LOOK_AFTER, LOOK_FLOORS]), np.float32(tolerance), scores,
     )  # fmt: skip
     left = np.flatnonzero(scores.ravel() > -np.inf)
     left = left[np.argsort(-scores.ravel()[left], kind="stable")[:max_count]]

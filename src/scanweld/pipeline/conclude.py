@@ -165,7 +165,7 @@ def _scan_report(
             reason = f"held by {pairs}; {told}"
     return replace(
         prepared_report(scan, verdict, reason),
-        num_keypoints=0 if found is None else len(found.points),
+        num_keypoints=None if found is None else len(found.points),
         edges=tuple(sorted(prepared[n].name for n in neighbours)),
         overlap=overlap,
         rms=graph.rms.get(k),
@@ -220,6 +220,7 @@ def pair_report(
         margin=result.margin,
         observability=result.observability,
         sliding=None if result.sliding is None else result.sliding.slide,
+        searched=result.is_searched,
         alternatives=tuple(
             AlternativeReport(
                 i_from_j=between_scans(option.i_from_j), score=option.score, weight=weight

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import rq
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
@@ -154,6 +153,8 @@ def _linear_pinhole(unit: FloatArray, pixels: FloatArray) -> FloatArray | None:
 
 def _decompose(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Intrinsics fx, fy, cx, cy, rotation and shift of a (3, 4) with positive determinant."""
+    from scipy.linalg import rq
+
     upper, rotation = (np.asarray(part, dtype=np.float64) for part in rq(matrix[:, :3]))
     signs = np.sign(np.diag(upper))
     upper, rotation = upper * signs, signs[:, None] * rotation

@@ -7,8 +7,8 @@ surface moves by less than its noise, and steps between surfaces stay.
 from math import comb
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 

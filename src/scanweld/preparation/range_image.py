@@ -1,7 +1,6 @@
 """A scan as a range image at the working resolution, whatever its file looked like."""
 
 import numpy as np
-from scipy import ndimage
 
 from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -201,19 +200,21 @@ def _surface(
     depth: FloatArray, camera: Camera, pixel: float, config: PrepareConfig
 ) -> tuple[FloatArray, TriangleMesh]:
     """The mesh of a depth image, and the image without pieces too small to be a surface."""
-    mesh = _depth_mesh(depth, camera, pixel, config)
-    keep = _piece_sizes(mesh) >= MIN_PIECE_SHARE * len(mesh.vertices)
+    points, faces = _depth_faces(depth, camera, pixel, config)
+    keep = _piece_sizes(faces, len(points)) >= MIN_PIECE_SHARE * len(points)
     if not keep.all():
         kept = depth.copy()
         kept[np.isfinite(depth)] = np.where(keep, depth[np.isfinite(depth)], np.nan)
         depth = kept
-        mesh = _depth_mesh(depth, camera, pixel, config)
-    return depth, mesh
+        points, faces = _depth_faces(depth, camera, pixel, config)
+    normals = _smoothed_normals(points, faces, camera)
+    return depth, TriangleMesh(vertices=points, faces=faces, normals=normals)
 
 
-def _depth_mesh(
+def _depth_faces(
     depth: FloatArray, camera: Camera, pixel: float, config: PrepareConfig
-) -> TriangleMesh:
+) -> tuple[FloatArray, IntArray]:
+    """Points (V, 3) of the surface's pixels in row-major order, and triangles (F, 3) of them."""
     has = np.isfinite(depth)
     grid = np.full(depth.shape, -1, dtype=np.int64)
     grid[has] = np.arange(int(has.sum()))
@@ -221,8 +222,7 @@ def _depth_mesh(
     faces = grid_faces(
         grid, points, points[:, 2], config.jump_pixels * pixel, MAX_EDGE_PIXELS * pixel
     )
-    normals = _smoothed_normals(points, faces, camera)
-    return TriangleMesh(vertices=points, faces=faces, normals=normals)
+    return points, faces
 
 
 def _smoothed_normals(points: FloatArray, faces: IntArray, camera: Camera) -> FloatArray:
@@ -233,14 +233,16 @@ def _smoothed_normals(points: FloatArray, faces: IntArray, camera: Camera) -> Fl
     return normals
 
 
-def _piece_sizes(mesh: TriangleMesh) -> IntArray:
+def _piece_sizes(faces: IntArray, num_vertices: int) -> IntArray:
     """How many vertices (V,) the connected piece of each vertex has."""
-    piece = pieces(mesh.faces, len(mesh.vertices))
+    piece = pieces(faces, num_vertices)
     return np.bincount(piece)[piece]
 
 
 def rim_pixels(depth: FloatArray, mesh: TriangleMesh, width: int) -> BoolArray:
     """Pixels (H, W) of a surface's border, and the next ones up to a width of so many."""
+    from scipy import ndimage
+
     has = np.isfinite(depth)
     border = np.zeros(depth.shape, dtype=bool)
     has_face = np.zeros(len(mesh.vertices), dtype=bool)

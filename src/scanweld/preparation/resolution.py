@@ -1,7 +1,6 @@
 """Point spacing of a scan."""
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import FloatArray
 
@@ -14,6 +13,8 @@ def point_spacing(points: FloatArray) -> float:
 
     Exact duplicates do not count as neighbours. Zero if all points coincide.
     """
+    from scipy.spatial import KDTree
+
     queries = points[:: max(1, len(points) // NUM_QUERIES)]
     distances = KDTree(points).query(queries, k=min(4, len(points)))[0].reshape(len(queries), -1)
     nearest = np.where(distances > 0, distances, np.inf).min(axis=1)

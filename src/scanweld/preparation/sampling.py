@@ -1,8 +1,8 @@
 """Points spread evenly over a surface, in an order whose every prefix is spread evenly too."""
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray, IntArray
 
 

@@ -14,7 +14,6 @@ How a grid fans out is better than all of these and known before (``camera_fit``
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import face_normals
@@ -89,6 +88,8 @@ def fall_off(depth: FloatArray, pixel: float) -> float:
     Pixels on the outer rim are compared with those a few pixels further inside. Jumps and holes
     do not count, slopes count up to 1.
     """
+    from scipy import ndimage
+
     stride = max(1, -(-max(depth.shape) // MAX_PIXELS))
     margin = 2 * RIM_PIXELS
     image = np.pad(depth[::stride, ::stride], margin, constant_values=np.nan)

@@ -1,7 +1,6 @@
 """What the empty pixels of a range image say: free space, or nothing."""
 
 import numpy as np
-from scipy import ndimage
 
 from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.prepared import PixelKind
@@ -35,6 +34,8 @@ def classify_pixels(
 
 def _surroundings(empty: BoolArray, in_view: BoolArray) -> BoolArray:
     """Of the connected empty regions (H, W), the one with most of the field of view's border."""
+    from scipy import ndimage
+
     region = np.zeros(empty.shape, dtype=np.int64)
     ndimage.label(empty, output=region)
     border = empty & ~np.asarray(ndimage.binary_erosion(in_view), dtype=np.bool_)
@@ -52,4 +53,6 @@ def close(mask: BoolArray, radius: float) -> BoolArray:
 
 def distance_to(mask: BoolArray) -> FloatArray:
     """Distance (H, W) in pixels to the nearest pixel of a mask."""
+    from scipy import ndimage
+
     return np.asarray(ndimage.distance_transform_edt(~mask), dtype=np.float64)

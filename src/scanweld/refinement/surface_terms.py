@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.matches import MIN_AGREEMENT, Matches
 from scanweld.geometry.pose import Pose

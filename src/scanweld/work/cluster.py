@@ -18,9 +18,9 @@ from typing import Any, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from scanweld.compiled.source import code_digest
 from scanweld.errors import InputError
 from scanweld.work.runners import Shared
-from scanweld.work.source import code_digest
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

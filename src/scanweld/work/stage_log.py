@@ -9,10 +9,10 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from scanweld.compiled.source import code_digest
 from scanweld.config import Section
 from scanweld.work.progress import Cache, Progress, StageAdvanced, telling
 from scanweld.work.runners import Runner, Shared, Threads
-from scanweld.work.source import code_digest
 from scanweld.work.threads import map_in_order
 
 try:

@@ -2,7 +2,7 @@
 
 Numba notices that a kernel's own file has changed, but not that a kernel or a constant of another
 file has, though that is compiled into it. So the folder's name holds a digest of all these files.
-This module must be imported before any that defines a kernel.
+Kernels are made by the ``njit`` of this module: so the folder is known before the first of them.
 """
 
 import atexit
@@ -14,10 +14,11 @@ import tempfile
 import time
 from pathlib import Path
 
+from numba import njit as njit
 from numba.core import config
 from platformdirs import user_cache_path
 
-from scanweld.work.source import PACKAGE, kernel_digest
+from scanweld.compiled.source import PACKAGE, kernel_digest
 
 logger = logging.getLogger(__name__)
 

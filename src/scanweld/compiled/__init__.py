@@ -1,0 +1,1 @@
+"""Compiled kernels: how they are made, and under which digest of their source they are kept."""
