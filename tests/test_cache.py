@@ -11,11 +11,16 @@ import numpy as np
 import pytest
 
 from scanweld.app.cache import CacheSize, FileCache, cache_folder
+from scanweld.app.job import Limits, run_job
+from scanweld.config import Config, FusionConfig, PairsConfig
 from scanweld.errors import WriteError
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
+from scanweld.pairs.result import PairResult
+from scanweld.pipeline.preparations import Preparation
 from scanweld.work.records import Records
 from tests.command_line import scanweld
+from tests.scenes import creature_scene, write_scans
 
 
 def test_cached_scan_comes_back_equal_and_frozen(tmp_path: Path):
@@ -105,9 +110,49 @@ def test_the_command_tells_and_clears(
     FileCache(cache_folder(Path("model"))).put("ab", np.zeros(250_000))
     (tmp_path / "mine").write_text("mine")
     assert scanweld("cache", "info") == 0
-    assert capsys.readouterr().out == ".scanweld-cache: 1 records kept, 2.0 MB\n"
+    assert capsys.readouterr().out == ".scanweld-cache: 1 record kept, 2.0 MB\n"
     assert scanweld("cache", "clear", tmp_path) == 0
-    assert "1 records removed" in capsys.readouterr().out
+    assert "1 record removed" in capsys.readouterr().out
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
     assert scanweld("cache", "clear") == 0
     assert "0 records removed" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_scan_more_or_fewer_redoes_what_it_touches_and_changes_no_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    scans = creature_scene(4, pixels=60.0).scans
+    folder = write_scans(tmp_path / "scans", scans)
+    files = sorted(folder.iterdir())
+    pairs = PairsConfig(num_anchors=8, num_turns=8, num_survivors=(40, 10))
+    config = Config(pairs=pairs, fusion=FusionConfig(max_voxels_across=60))
+    put, kept = FileCache.put, list[object]()
+
+    def counted(self: FileCache, key: str, value: object) -> None:
+        kept.append(value)
+        put(self, key, value)
+
+    monkeypatch.setattr(FileCache, "put", counted)
+
+    def model(name: str, inputs: list[Path], keeps: bool = True) -> dict[str, bytes]:
+        kept.clear()
+        output = tmp_path / name
+        run_job(inputs, output, config, limits=Limits(workers=2, keeps=keeps))
+        written = {path.name: path.read_bytes() for path in output.iterdir()}
+        return {name: data for name, data in written.items() if "report" not in name}
+
+    model("three", files[:3])
+    four = model("four", files)
+    assert "model.ply" in four and sum(isinstance(value, Preparation) for value in kept) == 1
+    quick = [value for value in kept if isinstance(value, PairResult) and not value.is_searched]
+    assert len(quick) == 3
+    renamed = [path.rename(path.with_name(f"z{path.name}")) for path in files[:2]]
+    two = model("two", renamed)
+    assert not any(isinstance(value, Preparation) for value in kept)
+    assert two == model("two anew", renamed, keeps=False) and not kept
+    for path, old in zip(renamed, files, strict=False):
+        path.rename(old)
+    assert four == model("four anew", files, keeps=False) and not kept
+    shutil.rmtree(cache_folder(tmp_path / "four"))
+    assert four == model("four again", files) and kept

@@ -34,7 +34,7 @@ METHODS = ("robust", "paper")
 def local_cluster(num_workers: int) -> Iterator[Any]:
     """A cluster of processes of this machine."""
     with distributed.LocalCluster(
-        n_workers=num_workers, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=num_workers, threads_per_worker=1, processes=True, dashboard_address=":0"
     ) as cluster:
         yield cluster
 

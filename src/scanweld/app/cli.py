@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from scanweld.app.model_commands import cache, export, fuse, report, run
+from scanweld.app import cache_commands
+from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
 from scanweld.app.options import NOT_GOOD
 from scanweld.errors import BudgetError, KnowledgeError, ScanweldError
@@ -108,7 +109,7 @@ def evaluate(
 
 app.command()(fuse)
 app.command()(export)
-app.add_typer(cache, name="cache")
+app.add_typer(cache_commands.app, name="cache")
 
 
 def _print_error(error: ScanweldError) -> None:

@@ -22,7 +22,6 @@ from scanweld.app.options import (
 from scanweld.choices import Method
 
 if TYPE_CHECKING:
-    from scanweld.app.cache import CacheSize
     from scanweld.knowledge.facts import Knowledge
 
 # What the commands do is imported inside them: help then starts at once.
@@ -213,30 +212,3 @@ def export(options: ExportOptions) -> None:
 
     lines = export_model(options.model_dir, options.output, options.wanted, force=options.force)
     typer.echo("\n".join(lines))
-
-
-cache = typer.Typer(
-    help="Finished work that runs keep beside their outputs.", rich_markup_mode=None
-)
-Place = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Where models were made.")]
-
-
-@cache.command("info")
-def cache_info(folder: Place = Path()) -> None:
-    """Show how much is kept."""
-    from scanweld.app.cache import NAME, FileCache
-
-    typer.echo(_told(folder / NAME, FileCache(folder / NAME).size(), "kept"))
-
-
-@cache.command("clear")
-def cache_clear(folder: Place = Path()) -> None:
-    """Remove all that is kept: nothing but time is lost."""
-    from scanweld.app.cache import NAME, FileCache
-
-    typer.echo(_told(folder / NAME, FileCache(folder / NAME).clear(), "removed"))
-
-
-def _told(folder: Path, size: "CacheSize", what: str) -> str:
-    megabytes = size.bytes / 1e6
-    return f"{folder}: {size.records} records {what}, {megabytes:.1f} MB"
