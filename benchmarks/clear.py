@@ -15,14 +15,13 @@ from benchmarks.results import Json
 from benchmarks.virtual.scene import Scene as Truth
 from scanweld.config import Config
 from scanweld.errors import InputError
-from scanweld.heat.features import Features, describe
+from scanweld.evidence.field import ScanField
+from scanweld.heat.features import describe
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pairs.quick import CLEAR_MARGIN, CLEAR_SCORE
 from scanweld.pairs.registrar import Edge, PairRegistrar
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pipeline.intake import Intake, take_in
-from scanweld.pipeline.method import Scene
-from scanweld.pipeline.robust import robust_method
 from scanweld.pipeline.stages import lay_out
 from scanweld.work.progress import NoCache, silent
 from scanweld.work.stage_log import Stages
@@ -62,21 +61,27 @@ class Pair:
     edge: Edge
     truth: Truth
     intake: Intake
+    fields: Sequence[ScanField]
     registrar: PairRegistrar
-    features: dict[int, Features]  # Of the scans for which something asked for them
+    parts: dict[int, PairScan]  # Of the scans for which something asked for them
 
     def searched(self, thorough: str) -> Json:
         """What the quick search says, and of all pairs, or of good ones, the thorough one."""
-        quick = self.registrar.search_quickly(self.edge)
+        task, fields = PairTask(edge=self.edge), [self.fields[k] for k in self.edge]
+        quick = self.registrar.search_quickly(task, *fields)
         told = self._told(quick)
         if thorough == "none" or (thorough == "good" and not told["good"]):
             return told
+        config = self.registrar.config
         for k in self.edge:
-            if k not in self.features:
-                self.features[k] = describe(self.intake.prepared[k], self.registrar.config.heat)
-        slow = self.registrar.register(self.edge, self.features)
+            if k not in self.parts:
+                prepared = self.intake.prepared[k]
+                self.parts[k] = self.registrar.scan(prepared, describe(prepared, config.heat))
+        slow = self.registrar.register(task, *(self.parts[k] for k in self.edge))
         both = [result.best for result in (quick, slow) if result.best is not None]
-        is_same = len(both) == 2 and self.registrar.problem(self.edge).is_same(*both)
+        i, j = fields
+        problem = PairProblem(edge=self.edge, i=i, j=j, config=config.pairs)
+        is_same = len(both) == 2 and problem.is_same(*both)
         return {**told, "thorough": self._told(slow), "same": is_same}
 
     def _told(self, result: PairResult) -> Json:
@@ -100,10 +105,10 @@ def pairs_of(truth: Truth) -> list[Pair]:
     """
     config, stages = Config(), Stages(workers=1, cache=NoCache(), progress=silent)
     intake = take_in(truth.scans, {}, Knowledge(), config, stages)
-    scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
-    registrar = robust_method(scene, config).shortcuts
-    assert isinstance(registrar, PairRegistrar)
-    shared = {"truth": truth, "intake": intake, "registrar": registrar, "features": {}}
+    shared = {
+        **{"truth": truth, "intake": intake, "registrar": PairRegistrar(config=config)},
+        **{"fields": lay_out(intake, config, stages).fields, "parts": {}},
+    }
     return [Pair(edge=edge, **shared) for edge in combinations(range(len(intake.prepared)), 2)]
 
 
