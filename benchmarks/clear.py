@@ -18,8 +18,9 @@ from scanweld.errors import InputError
 from scanweld.evidence.field import ScanField
 from scanweld.heat.features import describe
 from scanweld.knowledge.facts import Knowledge
+from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.quick import CLEAR_MARGIN, CLEAR_SCORE
-from scanweld.pairs.registrar import Edge, PairRegistrar
+from scanweld.pairs.registrar import Edge, PairRegistrar, PairScan, PairTask
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pipeline.intake import Intake, take_in
 from scanweld.pipeline.stages import lay_out

@@ -60,7 +60,8 @@ def test_commands_work_and_a_run_writes_a_model(tmp_path: Path):
     assert set(report["scans"]) == {"at_0", "at_25"}
     assert report["stages"]["pairs"]["peak_mb"] == 0
     assert (output / "report.html").is_file()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["model", "scans", "small.toml"]
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == [".scanweld-cache", "model", "scans", "small.toml"]
 
 
 @pytest.mark.slow
