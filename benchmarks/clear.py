@@ -27,7 +27,7 @@ from scanweld.pipeline.stages import lay_out
 from scanweld.work.progress import NoCache, silent
 from scanweld.work.stage_log import Stages
 
-NUM_SETS, NUM_ALL, NUM_GOOD = 450, 20, 60
+NUM_SETS, NUM_ALL, NUM_GOOD = 450, 20, 65
 """Sets; those of them of which all pairs, and good ones, are searched thoroughly too."""
 SCORES, MARGINS = (1.0, 1.25, CLEAR_SCORE, 2.0, 3.0), (1.0, CLEAR_MARGIN, 1.5, 1.75, 2.0)
 """Multiples of the score and of the margin of a good pair."""
