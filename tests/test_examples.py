@@ -28,7 +28,7 @@ SAYS = {
     ),
     "04_correct_and_resume.py": (
         r"\Afirst good: 6 scans are placed",
-        r"\b24 pieces of work were found again",
+        r"\b(1[5-9]|[2-9]\d) pieces of work were found again",
         r"apart scan_\d\d scan_\d\d: contradicted",
     ),
     "05_fuse_known_poses.py": (r"\b([5-9]\d{3}|\d{5,}) faces",),
