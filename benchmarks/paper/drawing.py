@@ -15,7 +15,7 @@ from scanweld.geometry.mesh import TriangleMesh, face_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.rasterize import render_depth
-from scanweld.geometry.shading import barycentric, looking_from
+from scanweld.geometry.shading import looking_from
 
 PAPER, INK, QUIET, CLAY = "#FBFAF7", "#23272F", "#737880", "#D3CCC0"
 WALL, BACK_PLANE, ACCENT, SECOND = "#E6D3A8", "#DCE4EE", "#C2274B", "#7A4FA3"
@@ -132,7 +132,7 @@ def render(meshes: Sequence[TriangleMesh], look: Look) -> ByteArray:
     depth, face_of = render_depth(points, faces, look.camera)
     seen = face_of >= 0
     corners = faces[face_of[seen]]
-    shares = barycentric(points[corners], look.camera.unproject_image(depth)[seen])
+    shares = _barycentric(points[corners], look.camera.unproject_image(depth)[seen])
     flat = _unit(face_normals(points, corners))
     smooth = _mixed(shares, turned[corners])
     color = _mixed(shares, colors[corners])
@@ -236,3 +236,13 @@ def _png(picture: ByteArray) -> bytes:
         if len(png) <= _MOST_BYTES:
             break
     return png
+
+
+def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
+    """Shares (N, 3) of the corners (N, 3, 3) of triangles in points (N, 3) on them, by (x, y)."""
+    a, b, c = (corners[:, k, :2] for k in range(3))
+    p = points[:, :2]
+    cross = lambda v, w: v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0]  # noqa: E731
+    area = cross(b - a, c - a)
+    shares = np.stack([cross(b - p, c - p), cross(c - p, a - p), cross(a - p, b - p)], axis=1)
+    return shares / np.where(area != 0, area, 1.0)[:, None]

@@ -211,13 +211,3 @@ def _camera_around(points: FloatArray, size: int) -> Camera:
         cx=0.5 * (width - 1) - scale * float(middle[0]),
         cy=0.5 * (height - 1) - scale * float(middle[1]),
     )
-
-
-def barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Shares (N, 3) of the corners (N, 3, 3) of triangles in points (N, 3) on them, by (x, y)."""
-    a, b, c = (corners[:, k, :2] for k in range(3))
-    p = points[:, :2]
-    cross = lambda v, w: v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0]  # noqa: E731
-    area = cross(b - a, c - a)
-    shares = np.stack([cross(b - p, c - p), cross(c - p, a - p), cross(a - p, b - p)], axis=1)
-    return shares / np.where(area != 0, area, 1.0)[:, None]
