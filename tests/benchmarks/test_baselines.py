@@ -85,8 +85,11 @@ def test_the_start_and_the_run_make_no_difference(name: str):
     entry, pair = installed(name), creature_pair(GAP_DEG)
     once, again = (entry.run(scan_pair(pair), anywhere(seed), 5) for seed in (1, 2))
     assert once.i_from_j is not None and again.i_from_j is not None
-    np.testing.assert_array_equal(once.i_from_j.matrix(), again.i_from_j.matrix())
-    assert once.score == again.score
+    # Other libraries add up in any order: the last digits of theirs are not ours to ask for.
+    np.testing.assert_allclose(
+        once.i_from_j.matrix(), again.i_from_j.matrix(), rtol=1e-9, atol=1e-9
+    )
+    assert once.score == pytest.approx(again.score, rel=1e-9)
 
 
 def test_the_published_method_goes_on_where_its_coarse_step_ends():
