@@ -6,8 +6,9 @@ VIOLATION_WEIGHT = 3.0
 """How much more a sample says that the other sensor contradicts than one that agrees."""
 CONTRADICT_WEIGHT = 1.5
 """Samples with other normals say less: at edges normals are poor."""
-FREE_WEIGHT = 1.0 / 3.0
-"""Samples in free space say less still: real silhouettes have gaps."""
+FREE_WEIGHT, GRAZING_WEIGHT = 1.0, 0.2
+"""Samples in free space say less; next to nothing where their surface is turned away from the
+sensor that looked past them, which may have lost it."""
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
 
@@ -23,9 +24,12 @@ class Evidence:
         agree: On the surface that the other sensor saw, normals alike.
         front: Before the surface that the other sensor saw: it would have seen them.
         contradict: On that surface, normals clearly different.
-        free: Where the other sensor looked past the object.
+        free: Where the other sensor looked past the object, and would have seen them.
+        grazing: There too, but turned so far away that it might have missed them.
         occluded: Behind the surface that the other sensor saw.
         unknown: On pixels that say nothing.
+        patches: Largest patch of samples that hang together before a surface, doubled, and in free
+            space (``violating_patches``); 0 where that was not asked.
     """
 
     agree: float
@@ -34,17 +38,24 @@ class Evidence:
     free: float
     occluded: float
     unknown: float
+    grazing: float = 0.0
+    patches: float = 0.0
 
     @property
     def score(self) -> float:
         """Agreement less weighted violations (docs/report.md): at most 1, which is perfect."""
         violated = VIOLATION_WEIGHT * self.front + CONTRADICT_WEIGHT * self.contradict
-        return self.agree - violated - FREE_WEIGHT * self.free
+        return self.agree - violated - FREE_WEIGHT * self.free - GRAZING_WEIGHT * self.grazing
 
     @property
     def violation(self) -> float:
         """Share of samples that the other sensor contradicts in any way."""
         return self.front + self.contradict + self.free
+
+    @property
+    def contradiction(self) -> float:
+        """Patches that violate, as a share of what agrees."""
+        return self.patches / max(self.agree, MIN_AGREE)
 
     @property
     def surface_violation(self) -> float:

@@ -5,12 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.prepared import PreparedScan, RangeImage
 
 VOXEL_DIAMETERS = 0.01
 GRID_MARGIN_DIAMETERS = 0.09
+NUM_NEIGHBOURS = 6
+"""Nearest samples of each: violations of neighbours make patches."""
 
 RASTER_DEPTH, RASTER_NORMAL, RASTER_OUTSIDE, RASTER_KIND = 0, 1, 4, 5
 """Channels of a raster: depth, normal (three), distance outside the silhouette, kind."""
@@ -28,6 +31,7 @@ class ScanField:
         raster: (H, W, 6) float32 depth, normal, outside, kind of each pixel.
         points: (N, 3) evenly spread samples, any prefix of which is evenly spread too.
         normals: (N, 3) their normals.
+        neighbours: (N, 6) int32 index of the samples nearest to each.
         centre: (3,) mean of the samples.
         surface: (M, 7) points, normals and a flag that is 1 off the rim: targets of matching.
         closest: (A, B, C) int32 index into surface of the point nearest to each voxel.
@@ -40,6 +44,7 @@ class ScanField:
     raster: NDArray[np.float32]
     points: FloatArray
     normals: FloatArray
+    neighbours: NDArray[np.int32]
     centre: FloatArray
     surface: FloatArray
     closest: NDArray[np.int32]
@@ -57,11 +62,18 @@ def make_field(scan: PreparedScan) -> ScanField:
         raster=_raster(scan.image),
         points=np.array(samples.points),
         normals=np.array(samples.normals),
+        neighbours=_neighbours(samples.points),
         centre=samples.points.mean(axis=0),
         surface=surface,
         closest=closest,
         origin=origin,
     )
+
+
+def _neighbours(points: FloatArray) -> NDArray[np.int32]:
+    count = min(NUM_NEIGHBOURS, len(points) - 1)
+    _, nearest = KDTree(points).query(points, count + 1)
+    return np.ascontiguousarray(nearest.reshape(len(points), -1)[:, 1:], dtype=np.int32)
 
 
 def _raster(image: RangeImage) -> NDArray[np.float32]:

@@ -18,13 +18,18 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PixelKind
 
-AGREE, FRONT, CONTRADICT, FREE, OCCLUDED, UNKNOWN, NEUTRAL = range(7)
-IS_FREE, IS_UNKNOWN = float(PixelKind.FREE), float(PixelKind.UNKNOWN)
+AGREE, FRONT, CONTRADICT, FREE, GRAZING, OCCLUDED, UNKNOWN, NEUTRAL = range(8)
+IS_SURFACE, IS_FREE = float(PixelKind.SURFACE), float(PixelKind.FREE)
+IS_UNKNOWN = float(PixelKind.UNKNOWN)
 
 AGREE_COSINE = 0.75
 """Cosine of the two normals above which they agree,"""
 CONTRADICT_COSINE = 0.3
 """and below which they contradict each other; between the two they say nothing."""
+MIN_FACING = 0.3
+"""Cosine of incidence above which a sensor would have seen a surface that it looks past. Below, and
+from behind, returns are lost and scans are trimmed: at right poses what lies in free space has a
+median cosine of 0.0 to 0.3, at wrong ones of 0.4 to 0.7."""
 
 
 def two_way_evidence(
@@ -62,7 +67,7 @@ def evidence_at_poses(
 
 def mean_evidence(a: Evidence, b: Evidence) -> Evidence:
     """The mean of both directions."""
-    names = ("agree", "front", "contradict", "free", "occluded", "unknown")
+    names = ("agree", "front", "contradict", "free", "grazing", "occluded", "unknown")
     return Evidence(**{name: 0.5 * (getattr(a, name) + getattr(b, name)) for name in names})
 
 
@@ -87,6 +92,7 @@ def _evidence(counts: NDArray[np.int64]) -> Evidence:
         front=float(share[FRONT]),
         contradict=float(share[CONTRADICT]),
         free=float(share[FREE]),
+        grazing=float(share[GRAZING]),
         occluded=float(share[OCCLUDED]),
         unknown=float(share[UNKNOWN]),
     )
@@ -136,7 +142,12 @@ def ask(
         beyond = abs(u - clamped_u) / camera[1] + abs(v - clamped_v) / camera[2]
         if camera[0] == 0.0:
             beyond *= z
-        return FREE if raster[row, column, RASTER_OUTSIDE] + beyond > tolerance else UNKNOWN
+        if raster[row, column, RASTER_OUTSIDE] + beyond <= tolerance:
+            return UNKNOWN
+        across, length = nz, 1.0
+        if camera[0] == 0.0:
+            across, length = nx * x + ny * y + nz * z, np.sqrt(x * x + y * y + z * z)
+        return FREE if -across > MIN_FACING * length else GRAZING
     step = z - raster[row, column, RASTER_DEPTH]
     if step > tolerance:
         return OCCLUDED
@@ -211,7 +222,7 @@ def count_evidence(
     max_samples: int,
     tolerance: float,
 ) -> NDArray[np.int64]:
-    """Counts (P, 2, 7) of each kind: of i's samples seen by j, of j's samples seen by i.
+    """Counts (P, 2, 8) of each kind: of i's samples seen by j, of j's samples seen by i.
 
     The first arguments are the arrays of both scans, as ``kernel_view`` gives them.
 
@@ -228,7 +239,7 @@ def count_evidence(
         max_samples: Samples of each scan that are asked about, at most.
         tolerance: Of depth, in the scans' unit.
     """
-    counts = np.zeros((poses.shape[0], 2, 7), dtype=np.int64)
+    counts = np.zeros((poses.shape[0], 2, 8), dtype=np.int64)
     for p in range(poses.shape[0]):
         pose = poses[p]
         for s in range(min(max_samples, points_i.shape[0])):

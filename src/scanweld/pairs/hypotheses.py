@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.compiled.kernels import njit
-from scanweld.evidence.evidence import CONTRADICT_WEIGHT, VIOLATION_WEIGHT
+from scanweld.evidence.evidence import CONTRADICT_WEIGHT, GRAZING_WEIGHT, VIOLATION_WEIGHT
 from scanweld.evidence.field import (
     RASTER_DEPTH,
     RASTER_KIND,
@@ -26,6 +26,7 @@ from scanweld.evidence.visibility import (
     CONTRADICT_COSINE,
     FREE,
     FRONT,
+    GRAZING,
     UNKNOWN,
 )
 from scanweld.geometry.arrays import FloatArray, frozen
@@ -51,12 +52,13 @@ SWEEP_VIOLATION_WEIGHT = 2.5
 
 
 def search_weights(violation: float) -> FloatArray:
-    """Weights (7,) of the kinds of evidence while searching; read-only, as kernels take them."""
-    weights = np.zeros(7)
+    """Weights (8,) of the kinds of evidence while searching; read-only, as kernels take them."""
+    weights = np.zeros(8)
     weights[AGREE] = 1.0
     weights[FRONT] = -violation
     weights[CONTRADICT] = -violation * CONTRADICT_WEIGHT / VIOLATION_WEIGHT
     weights[FREE] = -SEARCH_FREE_WEIGHT
+    weights[GRAZING] = -GRAZING_WEIGHT
     weights.flags.writeable = False
     return weights
 

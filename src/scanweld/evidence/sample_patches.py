@@ -1,0 +1,130 @@
+"""Violating samples that hang together: noise scatters them, a wrong pose makes patches.
+
+At a right pose what lies before the other surface, or in its free space, is a grain here and there.
+At a wrong one whole parts of the object do, and however much agrees elsewhere, such a part does not
+become smaller. So a pose is judged by its largest patch, not by the sum of all violations.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scanweld.compiled.kernels import njit
+from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
+from scanweld.evidence.visibility import (
+    FREE,
+    FRONT,
+    IS_SURFACE,
+    ask_forward,
+    kernel_view,
+    pose_rows,
+)
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+
+FRONT_PATCH_WEIGHT = 2.0
+"""A patch before a surface counts so many times one in free space: surfaces are seen, silhouettes
+are inferred."""
+
+
+def violating_patches(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> float:
+    """Largest patch before a surface, doubled, and largest patch in free space, as a share.
+
+    Shares are those of the samples of a scan; the mean of both directions is taken.
+
+    Args:
+        i: First scan.
+        j: Second scan.
+        i_from_j: The pose, between the sensor frames.
+        tolerance: Of the distance from the surface, in the scans' unit.
+    """
+    forward, backward = pose_rows([i_from_j, i_from_j.inverse()])
+    total = 0.0
+    for here, there, row in ((j, i, forward), (i, j, backward)):
+        _, _, points, normals = kernel_view(here)
+        sizes = _largest(
+            there.camera, there.raster, points, normals, here.neighbours, row, tolerance
+        )
+        total += 0.5 * (FRONT_PATCH_WEIGHT * sizes[0] + sizes[1]) / max(len(points), 1)
+    return float(total)
+
+
+@njit(cache=True, nogil=True)
+def _largest(
+    camera: FloatArray,
+    raster: NDArray[np.float32],
+    points: FloatArray,
+    normals: FloatArray,
+    neighbours: NDArray[np.int32],
+    pose: FloatArray,
+    tolerance: float,
+) -> NDArray[np.int64]:
+    """Samples (2,) in the largest patch before the surface that a sensor saw, and past it.
+
+    The pose row leads from the samples' frame to the sensor's; neighbours are (N, K).
+    """
+    count = points.shape[0]
+    said = np.zeros(count, dtype=np.int8)
+    for s in range(count):
+        kind = ask_forward(camera, raster, points[s], normals[s], pose, tolerance)
+        if kind == FREE:
+            said[s] = 2
+        elif kind == FRONT and _is_before(camera, raster, points[s], pose, tolerance):
+            said[s] = 1
+    root = np.arange(count)
+    for s in range(count):
+        if said[s] == 0:
+            continue
+        for n in neighbours[s]:
+            if said[n] == said[s]:
+                a, b = s, n
+                while root[a] != a:
+                    root[a] = root[root[a]]
+                    a = root[a]
+                while root[b] != b:
+                    root[b] = root[root[b]]
+                    b = root[b]
+                root[max(a, b)] = min(a, b)
+    sizes = np.zeros(count, dtype=np.int64)
+    largest = np.zeros(2, dtype=np.int64)
+    for s in range(count):
+        if said[s] != 0:
+            a = s
+            while root[a] != a:
+                a = root[a]
+            sizes[a] += 1
+            largest[said[s] - 1] = max(largest[said[s] - 1], sizes[a])
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def _is_before(
+    camera: FloatArray,
+    raster: NDArray[np.float32],
+    point: FloatArray,
+    pose: FloatArray,
+    tolerance: float,
+) -> bool:
+    """Whether a point lies before a surface by more than the tolerance, measured across it.
+
+    Along the ray a grazing surface is far from what lies just beside it.
+    """
+    x = pose[0] * point[0] + pose[1] * point[1] + pose[2] * point[2] + pose[9]
+    y = pose[3] * point[0] + pose[4] * point[1] + pose[5] * point[2] + pose[10]
+    z = pose[6] * point[0] + pose[7] * point[1] + pose[8] * point[2] + pose[11]
+    u, v, length = camera[1] * x, camera[2] * y, 1.0
+    if camera[0] == 0.0:
+        u /= z
+        v /= z
+        length = np.sqrt(x * x + y * y + z * z)
+    column = int(min(max(u + camera[3], 0.0), raster.shape[1] - 1.0) + 0.5)
+    row = int(min(max(v + camera[4], 0.0), raster.shape[0] - 1.0) + 0.5)
+    if raster[row, column, RASTER_KIND] != IS_SURFACE:
+        return False
+    n = RASTER_NORMAL
+    across = raster[row, column, n + 2] * z
+    if camera[0] == 0.0:
+        across += raster[row, column, n] * x + raster[row, column, n + 1] * y
+    else:
+        length = z
+    cosine = abs(across) / length
+    return (raster[row, column, RASTER_DEPTH] - z) * cosine > tolerance
