@@ -21,7 +21,7 @@ LAYERS = (
     ("__init__",),
     ("pipeline",),
     ("confidence", "knowledge"),
-    ("graph", "published", "reconstruction"),
+    ("graph", "published", "reconstruction", "sensor"),
     ("pairs", "fusion", "evaluation"),
     ("evidence", "heat", "refinement", "preparation", "work", "io"),
     ("contours",),

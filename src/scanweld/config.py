@@ -87,9 +87,9 @@ class PairsConfig(Section):
     """Distinct poses of a pair that are passed to the view graph, at most."""
     min_score: float = Field(default=0.10, ge=0, le=1)
     """Score below which a pair is not accepted on its own."""
-    max_violated_share: float = Field(default=0.5, ge=0)
-    """Number of samples that the other sensor contradicts over the number that agree, above which a
-    pair is not accepted on its own. Wrong poses often agree on much, but contradict much too."""
+    max_contradiction: float = Field(default=0.10, ge=0)
+    """Largest patches of samples that the other sensor contradicts, over what agrees, above which a
+    pair is not accepted on its own; more where the set shows that its silhouettes are none."""
     min_margin: float = Field(default=0.4, ge=0, le=1)
     """Share of its score by which the best pose must beat the best distinct alternative."""
     min_observability: float = Field(default=2.5e-4, ge=0)

@@ -9,6 +9,8 @@ RIVAL_SHIFT_DIAMETERS = 0.06
 CLEAN_SHARE, VIOLATION_RATIO = 0.15, 1.3
 """A rival is contradicted no more than a pose if its violations, as a share of what agrees, are
 within the first, or within so many times those of the pose."""
+CLEAN_CONTRADICTION = 0.05
+"""The same where violations are judged by their patches."""
 MIN_RIVAL_SHARE = 0.35
 """Least agreement of such a rival, as a share of that of the pose: slivers fit in many ways."""
 MIN_REFUTED_RIVAL_SHARE = 0.15
@@ -22,7 +24,12 @@ def margin_over(score: float, rivals: Sequence[float]) -> float:
     return min(1.0, (score - max(rivals)) / score) if rivals else 1.0
 
 
-def as_rival(score: float, agree: tuple[float, float], violated: tuple[float, float]) -> float:
+def as_rival(
+    score: float,
+    agree: tuple[float, float],
+    violated: tuple[float, float],
+    clean: float = CLEAN_SHARE,
+) -> float:
     """What a place scores as a rival of the best one.
 
     A rival that is contradicted no more explains the scans as well, if they overlap less in it:
@@ -32,8 +39,9 @@ def as_rival(score: float, agree: tuple[float, float], violated: tuple[float, fl
         score: Of the rival by itself.
         agree: What agrees, in the rival and in the best place.
         violated: Violations as a share of that, likewise.
+        clean: Of which so much is none.
     """
-    bearable = max(CLEAN_SHARE, VIOLATION_RATIO * violated[1])
+    bearable = max(clean, VIOLATION_RATIO * violated[1])
     if agree[0] <= MIN_RIVAL_SHARE * agree[1] or violated[0] > bearable:
         return score
     return score * max(1.0, agree[1] / agree[0])

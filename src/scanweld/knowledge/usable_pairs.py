@@ -12,7 +12,7 @@ from scanweld.knowledge.by_index import IndexedKnowledge
 from scanweld.knowledge.turntable import Turntable
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import Alternative, PairKind, PairResult
-from scanweld.pairs.verdict import no_pose, result_of
+from scanweld.pairs.verdict import held_to, no_pose, result_of
 
 KNOWN_SHARE = 0.5
 """Share of the usual score and margin that a pair needs where a fact speaks for it."""
@@ -28,10 +28,12 @@ class LenientVerdict:
     Attributes:
         fields: The scans, laid out.
         config: The usual settings.
+        max_contradiction: Largest patches of violating samples over what agrees, in this set.
     """
 
     fields: Sequence[ScanField]
     config: PairsConfig
+    max_contradiction: float
 
     def classify(self, edge: Edge, alternatives: tuple[Alternative, ...]) -> PairResult:
         """The result of a pair by some of its poses."""
@@ -43,7 +45,9 @@ class LenientVerdict:
         )
         i, j = (self.fields[k] for k in edge)
         problem = PairProblem(edge=edge, i=i, j=j, config=lenient)
-        return result_of(problem, alternatives)
+        result = result_of(problem, alternatives)
+        patches = 0.0 if result.best is None else result.best.evidence.patches
+        return held_to(result, self.max_contradiction, patches)
 
 
 def usable_pairs(

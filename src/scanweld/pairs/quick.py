@@ -50,6 +50,7 @@ def is_clear(result: PairResult, config: PairsConfig) -> bool:
     return (
         best is not None
         and result.kind is PairKind.GOOD
+        and best.evidence.contradiction <= config.max_contradiction
         and best.score >= CLEAR_SCORE * config.min_score
         and result.margin >= CLEAR_MARGIN * config.min_margin
     )

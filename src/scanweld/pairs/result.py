@@ -7,7 +7,13 @@ from enum import StrEnum
 import numpy as np
 
 from scanweld.evidence.evidence import MIN_AGREE, Evidence
-from scanweld.evidence.rivals import MIN_REFUTED_RIVAL_SHARE, as_rival, margin_over, refutation
+from scanweld.evidence.rivals import (
+    CLEAN_CONTRADICTION,
+    MIN_REFUTED_RIVAL_SHARE,
+    as_rival,
+    margin_over,
+    refutation,
+)
 from scanweld.evidence.slippage import Slippage
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.pose import Pose
@@ -52,9 +58,8 @@ def rival_score(rival: Alternative, best: Alternative) -> float:
     said, told = rival.evidence, best.evidence
     if said.agree < MIN_AGREE:
         return rival.score
-    told_share = told.violation / max(told.agree, MIN_AGREE)
-    shares = said.violation / said.agree, told_share
-    return as_rival(rival.score, (said.agree, told.agree), shares)
+    patches = said.contradiction, told.contradiction
+    return as_rival(rival.score, (said.agree, told.agree), patches, CLEAN_CONTRADICTION)
 
 
 def near_best(alternatives: Sequence[Alternative], max_margin: float) -> list[Alternative]:
@@ -103,7 +108,7 @@ def refutation_among(chosen: Alternative, alternatives: Sequence[Alternative]) -
     """How clearly the others of a pair's poses are refuted."""
     least = max(MIN_AGREE, MIN_REFUTED_RIVAL_SHARE * chosen.evidence.agree)
     rivals = [other.evidence for other in alternatives if other is not chosen]
-    return refutation([told.violation / told.agree for told in rivals if told.agree >= least])
+    return refutation([told.contradiction for told in rivals if told.agree >= least])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scanweld.config import PairsConfig
-from scanweld.evidence.evidence import MIN_AGREE
+from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.evidence.information import information_from, observability_of
 from scanweld.evidence.slippage import Slide, Slippage, slide_words, slippage_of
 from scanweld.geometry.arrays import FloatArray
@@ -25,6 +25,8 @@ from scanweld.pairs.symmetry import Symmetry, symmetry_of
 ALIKE_SHARE = 0.5
 """Rivals within this share of the margin that makes a pose sure show symmetries; those beaten more
 clearly are often chance."""
+MAX_CONTRADICTION = 0.35
+"""Patches over what agrees that no set excuses: whole parts of wrong poses come to this."""
 _NOTHING_MEETS = "no pose makes the scans overlap"
 
 
@@ -122,6 +124,30 @@ def classify_pair(
     )
 
 
+def held_to(result: PairResult, max_contradiction: float, patches: float) -> PairResult:
+    """A pair by what its set lets violating patches come to, once that is known.
+
+    Args:
+        result: The pair.
+        max_contradiction: Largest patches over what agrees.
+        patches: Largest patches of its best pose, at the tolerance of the set.
+    """
+    best = result.best
+    if best is None or result.kind in (PairKind.CONTRADICTED, PairKind.NO_OVERLAP):
+        return result
+    evidence = replace(best.evidence, patches=patches)
+    if evidence.contradiction <= max_contradiction:
+        return result
+    return replace(
+        result,
+        kind=PairKind.CONTRADICTED,
+        reason=_contradicted(evidence),
+        sliding=None,
+        symmetry=None,
+        rests_on_feature=False,
+    )
+
+
 def no_pose(i: int, j: int, reason: str) -> PairResult:
     """The result of a pair of scans i < j for which there is no pose at all."""
     return PairResult(
@@ -142,6 +168,11 @@ def not_compared(i: int, j: int, reason: str) -> PairResult:
     return replace(no_pose(i, j, reason), is_searched=False, is_compared=False)
 
 
+def _contradicted(evidence: Evidence) -> str:
+    told = f"patches of {evidence.patches:.2f} violated, {evidence.agree:.2f} agreed"
+    return f"each sensor saw through the other's surface: {told}"
+
+
 def _kind(
     alternatives: tuple[Alternative, ...],
     sliding: Slippage | None,
@@ -152,9 +183,8 @@ def _kind(
     if not alternatives or alternatives[0].evidence.agree < MIN_AGREE:
         return PairKind.NO_OVERLAP, _NOTHING_MEETS
     best = alternatives[0]
-    if best.evidence.violation > config.max_violated_share * best.evidence.agree:
-        told = f"{best.evidence.violation:.2f} violated, {best.evidence.agree:.2f} agreed"
-        return PairKind.CONTRADICTED, f"each sensor saw through the other's surface: {told}"
+    if best.evidence.contradiction > MAX_CONTRADICTION:
+        return PairKind.CONTRADICTED, _contradicted(best.evidence)
     if best.score < config.min_score:
         told = f"score {best.score:.2f} below {config.min_score:.2f}"
         return PairKind.NO_OVERLAP, f"too little overlap to be sure: {told}"

@@ -14,6 +14,7 @@ from scanweld.heat.features import Features
 from scanweld.pairs.registrar import PairScan, PairTask
 from scanweld.pairs.result import PairResult
 from scanweld.pipeline.intake import Intake
+from scanweld.sensor.model import SensorModel
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -24,11 +25,13 @@ class Scene:
         intake: The scans, prepared, and what users know of them.
         judge: Gives the evidence on any pair at any pose.
         features: PA-HKS keypoints of the scans for which something asked for them.
+        sensor: What the set says of its sensor; None before its pairs are known.
     """
 
     intake: Intake
     judge: Judge
     features: Mapping[int, Features] = field(default_factory=dict)
+    sensor: SensorModel | None = None
 
 
 class Shortcuts(Protocol):

@@ -32,7 +32,10 @@ def graph_problem(
         components: What is placed together already.
     """
     judge, known = scene.judge, scene.intake.known
-    verdict = LenientVerdict(fields=judge.fields, config=config.pairs)
+    limit = config.pairs.max_contradiction
+    if scene.sensor is not None:
+        limit = scene.sensor.max_contradiction
+    verdict = LenientVerdict(fields=judge.fields, config=config.pairs, max_contradiction=limit)
     return GraphProblem(
         pairs=usable_pairs(found, known, axis, verdict),
         centres=judge.centres,
@@ -46,6 +49,8 @@ def graph_problem(
 
 
 def same_pose(scene: Scene, config: Config) -> PoseTolerance:
-    """Poses of a scan that differ by less close a cycle."""
+    """Poses of a scan that differ by less close a cycle; more where the sensor is less exact."""
+    usual = config.pairs.fine_tolerance_diameters * scene.judge.diameter
+    wider = scene.judge.tolerance / usual
     shift = config.graph.max_cycle_diameters * scene.judge.diameter
-    return PoseTolerance(angle_deg=config.graph.max_cycle_deg, shift=shift)
+    return PoseTolerance(angle_deg=wider * config.graph.max_cycle_deg, shift=wider * shift)

@@ -25,6 +25,7 @@ from scanweld.pipeline.problem import graph_problem
 from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
 from scanweld.refinement.scale import ScaleEstimate, estimate_scales
+from scanweld.sensor.standing import standing_scans
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
 from scanweld.work.threads import map_in_order
@@ -89,6 +90,7 @@ def refine_placed(
     with stages.stage("refine") as counts:
         graph = refine_graph(graph, method.refine, scene.judge)
         doubts = find_doubts(graph, scene.judge, config.graph)
+        doubts = {**doubts, **_standing_doubts(scene, graph)}
         if axis is not None:
             doubts = {**off_axis_doubts(graph, axis), **doubts}
         graph = replace(graph, doubts={**_scale_doubts(scene.intake, graph), **doubts})
@@ -97,6 +99,18 @@ def refine_placed(
     for k, reason in graph.unplaced.items():
         stages.progress(ScanRefused(scan=prepared[k].name, reason=reason))
     return graph
+
+
+def _standing_doubts(scene: Scene, graph: ViewGraph) -> dict[int, str]:
+    """Scans that a camera that stood still took of something that moved."""
+    doubts: dict[int, str] = {}
+    for component in graph.components:
+        found = standing_scans(
+            scene.judge.fields, component.poses, graph.compared(component), scene.judge.diameter
+        )
+        if found is not None:
+            doubts.update(dict.fromkeys(found.scans, found.words()))
+    return doubts
 
 
 def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:

@@ -1,0 +1,55 @@
+"""The set's own sensor: learnt from its pairs, and what they come to when judged by it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from scanweld.config import Config
+from scanweld.evidence.sample_patches import violating_patches
+from scanweld.graph.view_graph import Edge
+from scanweld.pairs.result import PairResult
+from scanweld.pairs.verdict import held_to
+from scanweld.pipeline.method import Scene
+from scanweld.pipeline.registration import Registered
+from scanweld.sensor.learn import learn_sensor
+from scanweld.sensor.model import SensorModel
+from scanweld.work.stage_log import Stages
+
+
+def learnt(registered: Registered, config: Config, stages: Stages) -> Registered:
+    """The scans and pairs of a run, judged by what the pairs say of the sensor.
+
+    Poses were ranked by a fine tolerance, which tells the best from its neighbours. Whether it is
+    right is asked with the tolerance that the set's own sensor needs.
+    """
+    scene = registered.scene
+    judge = scene.judge
+    with stages.stage("sensor") as counts:
+        sensor = learn_sensor(
+            registered.pairs,
+            judge.fields,
+            judge.diameter,
+            judge.tolerance,
+            config.pairs.max_contradiction,
+        )
+        counts["certain"] = sensor.num_certain
+        judge = replace(judge, tolerance=sensor.tolerance)
+        pairs = _held(registered.pairs, scene, sensor)
+    return replace(
+        registered, scene=replace(scene, judge=judge, sensor=sensor), pairs=pairs
+    )
+
+
+def _held(
+    pairs: Mapping[Edge, PairResult], scene: Scene, sensor: SensorModel
+) -> dict[Edge, PairResult]:
+    """The pairs, those whose violations hang together more than right ones' do contradicted."""
+    judge, held = scene.judge, {}
+    for (i, j), pair in pairs.items():
+        patches = 0.0
+        if pair.best is not None:
+            patches = pair.best.evidence.patches
+            if sensor.tolerance > judge.tolerance:
+                pose = pair.best.i_from_j
+                patches = violating_patches(judge.fields[i], judge.fields[j], pose, sensor.tolerance)
+        held[i, j] = held_to(pair, sensor.max_contradiction, patches)
+    return held

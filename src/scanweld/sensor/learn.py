@@ -1,0 +1,134 @@
+"""Certain pairs -> sensor model: what surfaces make sure of tells how well they are measured.
+
+Free space takes no part in what makes a pair certain, else nothing could be learnt of it.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.information import two_way_matches
+from scanweld.geometry.arrays import FloatArray
+from scanweld.graph.view_graph import Edge
+from scanweld.pairs.result import PairResult
+from scanweld.pairs.verdict import MAX_CONTRADICTION
+from scanweld.sensor.model import SensorModel
+
+CERTAIN_AGREE, CERTAIN_VIOLATED = 0.25, 0.15
+"""A certain pair agrees on so much; of that, so little lies before a surface or contradicts it."""
+CERTAIN_MARGIN, CERTAIN_OBSERVABILITY = 0.4, 1e-3
+"""It beats its rivals by this share, and slides nowhere."""
+MAX_CERTAIN = 60
+"""Pairs that are learnt from, the best first: more say the same."""
+MIN_CERTAIN = 3
+"""Fewer say nothing of the set's silhouettes."""
+REACH_DIAMETERS = 0.04
+"""Farthest that surfaces that should coincide may lie apart."""
+TOLERANCE_SIGMAS = 5.0
+"""Depth tolerance in standard deviations,"""
+MAX_TOLERANCE_DIAMETERS = 0.03
+"""but not more than this: what lies farther apart is another place."""
+USUAL_SPREAD = 0.75
+"""Quantile of the contradiction of certain pairs that is added to the usual limit."""
+PATCH_DIAMETERS = 0.06
+"""Edge of the cells within which residuals are averaged to find what neighbours share."""
+PRIOR_SIGMA_DIAMETERS = 0.002
+"""Of a set that does not tell: between range scanners (0.001) and depth cameras (0.0045)."""
+
+
+def learn_sensor(
+    pairs: Mapping[Edge, PairResult],
+    fields: Sequence[ScanField],
+    diameter: float,
+    usual_tolerance: float,
+    usual_contradiction: float,
+) -> SensorModel:
+    """Learn from the pairs of a set what its sensor does.
+
+    Args:
+        pairs: All pairs, judged.
+        fields: All scans, laid out.
+        diameter: Of the run, in the scans' unit.
+        usual_tolerance: Depth tolerance, at least, in the scans' unit.
+        usual_contradiction: Limit of violating patches over what agrees, at least.
+    """
+    certain = sorted(
+        (pair for pair in pairs.values() if _is_certain(pair)),
+        key=lambda pair: (-pair.alternatives[0].score, pair.i, pair.j),
+    )[:MAX_CERTAIN]
+    found = [_residuals(pair, fields, diameter) for pair in certain]
+    residuals = np.concatenate([[], *(each for each, _ in found)])
+    if len(residuals) == 0:
+        prior = PRIOR_SIGMA_DIAMETERS * diameter
+        return SensorModel(
+            num_certain=0,
+            sigma=prior,
+            white=prior,
+            correlated=prior,
+            tolerance=usual_tolerance,
+            max_contradiction=usual_contradiction,
+        )
+    sigma = 1.4826 * float(np.median(np.abs(residuals)))
+    white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
+    limit = usual_contradiction
+    if len(certain) >= MIN_CERTAIN:
+        shown = [pair.alternatives[0].evidence.contradiction for pair in certain]
+        limit += float(np.quantile(shown, USUAL_SPREAD))
+    return SensorModel(
+        num_certain=len(certain),
+        sigma=sigma,
+        white=white,
+        correlated=correlated,
+        tolerance=min(
+            max(usual_tolerance, TOLERANCE_SIGMAS * sigma), MAX_TOLERANCE_DIAMETERS * diameter
+        ),
+        max_contradiction=min(limit, MAX_CONTRADICTION),
+    )
+
+
+def _is_certain(pair: PairResult) -> bool:
+    """Whether surfaces alone leave no doubt of a pair."""
+    if pair.best is None:
+        return False
+    told = pair.best.evidence
+    return (
+        told.agree >= CERTAIN_AGREE
+        and told.front + told.contradict <= CERTAIN_VIOLATED * told.agree
+        and pair.observability >= CERTAIN_OBSERVABILITY
+        and pair.margin >= CERTAIN_MARGIN
+    )
+
+
+def _residuals(
+    pair: PairResult, fields: Sequence[ScanField], diameter: float
+) -> tuple[FloatArray, FloatArray]:
+    """Distances (N,) between the surfaces of a pair at its best pose, and where, (N, 3)."""
+    matches = two_way_matches(
+        fields[pair.i], fields[pair.j], pair.alternatives[0].i_from_j, REACH_DIAMETERS * diameter
+    )
+    return matches[3], matches[0]
+
+
+def _parts(
+    found: Sequence[tuple[FloatArray, FloatArray]], sigma: float, patch: float
+) -> tuple[float, float]:
+    """What residuals within a patch do not share, and what they do, as standard deviations."""
+    within, freedom, means = 0.0, 0, []
+    for residuals, points in found:
+        kept = np.abs(residuals) <= 4.0 * sigma
+        residuals, cells = residuals[kept], np.floor(points[kept] / patch).astype(np.int64)
+        if len(residuals) == 0:
+            continue
+        _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+        cell = cell.ravel()
+        mean = np.bincount(cell, weights=residuals) / count
+        within += float(((residuals - mean[cell]) ** 2).sum())
+        freedom += len(residuals) - len(count)
+        means += [(m, n) for m, n in zip(mean, count, strict=True) if n > 1]
+    variance = within / max(freedom, 1)
+    if not means:
+        return float(np.sqrt(variance)), sigma
+    mean, count = np.array(means).T
+    shared = float(np.average(mean**2, weights=count)) - variance * len(count) / float(count.sum())
+    return float(np.sqrt(variance)), float(np.sqrt(max(shared, 0.0)))
