@@ -105,7 +105,7 @@ def render_surface(
         pixels cut at depth jumps: vertices are the surface pixels in row-major order.
     """
     camera = working_camera(scan, points, pixel, margin)
-    faces = _scan_faces(scan, points, spacing, config)
+    faces, max_step = _scan_faces(scan, points, spacing, config), config.jump_pixels * pixel
     if faces is not None:
         depth, _ = render_depth(points, faces, camera)
         # Points that lost returns have cut off from every face are surface too: without them the
@@ -114,12 +114,13 @@ def render_surface(
         is_lonely = np.ones(len(points), dtype=bool)
         if not has_gaps(depth):
             is_lonely[faces] = False
-        depth = np.where(np.isfinite(depth), depth, _splat(points[is_lonely], camera))
+        splat = _splat(points[is_lonely], camera, max_step)
+        depth = np.where(np.isfinite(depth), depth, splat)
     else:
-        depth = _splat(points, camera)
+        depth = _splat(points, camera, max_step)
     for _ in range(GAP_ROUNDS):
-        depth = _fill_pinholes(depth, config.jump_pixels * pixel)
-    depth = clean_depth(depth, pixel, config.jump_pixels * pixel, max_noise_pixels)
+        depth = _fill_pinholes(depth, max_step)
+    depth = clean_depth(depth, pixel, max_step, max_noise_pixels)
     depth, mesh = _surface(depth, camera, pixel, config)
     return camera, depth, mesh
 
@@ -169,14 +170,45 @@ def _scan_faces(
     return grid_faces(scan.grid, points, points[:, 2], max_step, MAX_EDGE_PIXELS * spacing)
 
 
-def _splat(points: FloatArray, camera: Camera) -> FloatArray:
-    """Nearest depth of the points in each pixel, NaN where there is none."""
+def _splat(points: FloatArray, camera: Camera, max_step: float) -> FloatArray:
+    """Depth of the nearest surface at the middle of each pixel, NaN where there is none.
+
+    The nearest point of a pixel alone would bring tilted surfaces forward: the whole scan would
+    look larger than it is. So points of one surface are averaged, and brought to the middle.
+
+    Args:
+        points: (N, 3), sensor frame.
+        camera: Of the image.
+        max_step: Points of a pixel farther behind the nearest one are on another surface.
+    """
+    shape = (camera.height, camera.width)
     pixels, z = camera.project(points)
-    u, v = np.rint(pixels).astype(np.int64).T
-    depth = np.full((camera.height, camera.width), np.inf)
-    np.minimum.at(depth, (v, u), z)
-    depth[np.isinf(depth)] = np.nan
-    return depth
+    cells = np.rint(pixels).astype(np.int64)
+    flat = cells[:, 1] * camera.width + cells[:, 0]
+    nearest = np.full(shape, np.inf).ravel()
+    np.minimum.at(nearest, flat, z)
+    front = z <= nearest[flat] + max_step
+    away, flat, z = (pixels - cells)[front], flat[front], z[front]
+    count = np.bincount(flat, minlength=nearest.size).reshape(shape)
+
+    def mean(values: FloatArray) -> FloatArray:
+        total = np.bincount(flat, weights=values, minlength=nearest.size).reshape(shape)
+        return np.divide(total, count, out=np.full(shape, np.nan), where=count > 0)
+
+    depth = mean(z)
+    right, down = mean(away[:, 0]), mean(away[:, 1])
+    return depth - right * _slope(depth, 1, max_step) - down * _slope(depth, 0, max_step)
+
+
+def _slope(depth: FloatArray, axis: int, max_step: float) -> FloatArray:
+    """Change of depth (H, W) from pixel to pixel along an axis; 0 across edges and beside gaps."""
+    padded = np.pad(depth, 1, constant_values=np.nan)
+    after = np.roll(padded, -1, axis)[1:-1, 1:-1] - depth
+    before = depth - np.roll(padded, 1, axis)[1:-1, 1:-1]
+    steps = np.stack([after, before])
+    is_one = np.abs(steps) <= max_step
+    total = np.where(is_one, steps, 0.0).sum(axis=0)
+    return total / np.maximum(is_one.sum(axis=0), 1)
 
 
 def _fill_pinholes(depth: FloatArray, max_step: float) -> FloatArray:
