@@ -152,9 +152,6 @@ class GraphConfig(Section):
     max_inner_violated_share: float = Field(default=0.075, ge=0)
     """The same when a refused merge is judged again after all its scans were refined, without the
     pixels along depth edges."""
-    max_violation: float = Field(default=0.03, ge=0)
-    """Share of the samples by which the contradicted ones may exceed half of those that agree, in
-    any pair of scans across a merge."""
 
 
 class ContoursConfig(Section):

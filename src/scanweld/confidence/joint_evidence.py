@@ -124,6 +124,7 @@ def _standing(
     scores = [
         as_rival(rival.score, (rival.agree, here.agree), (_violated(rival), _violated(here)))
         for rival in rivals
+        if not rival.is_contradicted
     ]
     margin = margin_over(here.score, scores)
     least = max(MIN_AGREE, MIN_REFUTED_RIVAL_SHARE * here.agree)

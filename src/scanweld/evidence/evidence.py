@@ -9,6 +9,9 @@ CONTRADICT_WEIGHT = 1.5
 FREE_WEIGHT, GRAZING_WEIGHT = 1.0, 0.2
 """Samples in free space say less; next to nothing where their surface is turned away from the
 sensor that looked past them, which may have lost it."""
+MAX_EXCESS = 0.03
+"""Share of the samples by which violating patches of a pair, whose place other pairs say, may
+exceed what its set excuses: patches of right pairs that hardly meet come to 0.04."""
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
 
@@ -56,6 +59,10 @@ class Evidence:
     def contradiction(self) -> float:
         """Patches that violate, as a share of what agrees."""
         return self.patches / max(self.agree, MIN_AGREE)
+
+    def excess(self, max_contradiction: float) -> float:
+        """Share of the samples by which violating patches exceed what a set excuses."""
+        return self.patches - max_contradiction * self.agree
 
     @property
     def surface_violation(self) -> float:

@@ -1,7 +1,7 @@
 """The judge of a run: what the sensors say of any pair of its scans at any pose."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -10,6 +10,7 @@ from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.patches import PixelConsensus, pixel_consensus
 from scanweld.evidence.pixels import see
+from scanweld.evidence.sample_patches import violating_patches
 from scanweld.evidence.visibility import evidence_at_poses, mean_evidence
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
@@ -23,6 +24,11 @@ Poses = Mapping[int, Pose]
 
 class PairJudge(Protocol):
     """What the stages after the pairs ask: how well scans fit at a pose, by index."""
+
+    @property
+    def max_contradiction(self) -> float:
+        """Largest patches of violating samples, over what agrees, that the set excuses."""
+        ...
 
     def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
         """Mean evidence of both directions at a pose between the sensor frames."""
@@ -52,11 +58,13 @@ class Judge:
         fields: The scans, laid out.
         diameter: Diameter of the run, in the scans' unit.
         tolerance: Depth tolerance of the evidence, in the scans' unit.
+        max_contradiction: Largest patches of violating samples, over what agrees, of right poses.
     """
 
     fields: Sequence[ScanField]
     diameter: float
     tolerance: float
+    max_contradiction: float
 
     @cached_property
     def centres(self) -> list[FloatArray]:
@@ -77,7 +85,11 @@ class Judge:
         both = evidence_at_poses(
             self.fields[i], self.fields[j], i_from_j, self.tolerance, NUM_JUDGED_SAMPLES
         )
-        return [mean_evidence(*directions) for directions in both]
+        patches = violating_patches(self.fields[i], self.fields[j], i_from_j, self.tolerance)
+        return [
+            replace(mean_evidence(*directions), patches=patch)
+            for directions, patch in zip(both, patches, strict=True)
+        ]
 
     def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
         """The same, samples before the edges of what the other sensor saw being unknown."""

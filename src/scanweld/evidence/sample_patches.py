@@ -5,19 +5,14 @@ At a wrong one whole parts of the object do, and however much agrees elsewhere, 
 become smaller. So a pose is judged by its largest patch, not by the sum of all violations.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.compiled.kernels import njit
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
-from scanweld.evidence.visibility import (
-    FREE,
-    FRONT,
-    IS_SURFACE,
-    ask_forward,
-    kernel_view,
-    pose_rows,
-)
+from scanweld.evidence.visibility import FREE, FRONT, IS_SURFACE, ask_forward, pose_rows
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 
@@ -26,26 +21,47 @@ FRONT_PATCH_WEIGHT = 2.0
 are inferred."""
 
 
-def violating_patches(i: ScanField, j: ScanField, i_from_j: Pose, tolerance: float) -> float:
-    """Largest patch before a surface, doubled, and largest patch in free space, as a share.
+def violating_patches(
+    i: ScanField, j: ScanField, i_from_j: Sequence[Pose], tolerance: float
+) -> list[float]:
+    """Largest patch before a surface, doubled, and largest patch in free space, at each pose.
 
-    Shares are those of the samples of a scan; the mean of both directions is taken.
+    They are shares of the samples of a scan; the mean of both directions is taken.
 
     Args:
         i: First scan.
         j: Second scan.
-        i_from_j: The pose, between the sensor frames.
+        i_from_j: The poses, between the sensor frames.
         tolerance: Of the distance from the surface, in the scans' unit.
     """
-    forward, backward = pose_rows([i_from_j, i_from_j.inverse()])
-    total = 0.0
-    for here, there, row in ((j, i, forward), (i, j, backward)):
-        _, _, points, normals = kernel_view(here)
-        sizes = _largest(
-            there.camera, there.raster, points, normals, here.neighbours, row, tolerance
-        )
-        total += 0.5 * (FRONT_PATCH_WEIGHT * sizes[0] + sizes[1]) / max(len(points), 1)
-    return float(total)
+    forward = _weighed(j, i, pose_rows(i_from_j), tolerance)
+    backward = _weighed(i, j, pose_rows([pose.inverse() for pose in i_from_j]), tolerance)
+    return (0.5 * (forward + backward)).tolist()
+
+
+def _weighed(here: ScanField, there: ScanField, rows: FloatArray, tolerance: float) -> FloatArray:
+    """The patches (P,) of one scan's samples for the other's sensor; rows are there_from_here."""
+    sizes = _largest_patches(
+        there.camera, there.raster, here.points, here.normals, here.neighbours, rows, tolerance
+    )
+    return (FRONT_PATCH_WEIGHT * sizes[:, 0] + sizes[:, 1]) / max(len(here.points), 1)
+
+
+@njit(cache=True, nogil=True)
+def _largest_patches(
+    camera: FloatArray,
+    raster: NDArray[np.float32],
+    points: FloatArray,
+    normals: FloatArray,
+    neighbours: NDArray[np.int32],
+    poses: FloatArray,
+    tolerance: float,
+) -> NDArray[np.int64]:
+    """Sizes (P, 2) at each pose row (P, 12)."""
+    sizes = np.zeros((len(poses), 2), dtype=np.int64)
+    for p in range(len(poses)):
+        sizes[p] = _largest(camera, raster, points, normals, neighbours, poses[p], tolerance)
+    return sizes
 
 
 @njit(cache=True, nogil=True)

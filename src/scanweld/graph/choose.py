@@ -112,7 +112,7 @@ def is_uncontradicted(
 ) -> bool:
     """Whether neither a pair across nor all of them together speak against a merge."""
     share = config.max_violated_share if max_violated_share is None else max_violated_share
-    return merge.worst <= config.max_violation and merge.violated <= share * merge.agree
+    return not merge.is_contradicted and merge.violated <= share * merge.agree
 
 
 def _passes(merge: Merge, config: GraphConfig, max_violated_share: float) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from scanweld.evidence.evidence import VIOLATION_WEIGHT, Evidence
+from scanweld.evidence.evidence import MAX_EXCESS, VIOLATION_WEIGHT, Evidence
 from scanweld.evidence.judge import PairJudge, Poses
 from scanweld.evidence.patches import PixelConsensus, is_refuted_jointly, violates_free_space
 from scanweld.evidence.rivals import margin_over
@@ -32,7 +32,7 @@ class Merge:
         agree: Sum over the pairs across of the shares of samples that agree,
         violated: that lie before the other's surface or contradict it,
         free: that lie in the other's free space.
-        worst: Largest excess of violation over agreement of any single pair across.
+        worst: Largest excess of violating patches over agreement of any single pair across.
         margin: Share of the score by which it beats its best distinct rival.
     """
 
@@ -49,6 +49,11 @@ class Merge:
         """Proposals found independently: start poses say the same of all pairs, and count once."""
         found = sum(not proposal.is_given for proposal in self.proposals)
         return found + (found < len(self.proposals))
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether any single pair across shows that the merge is wrong."""
+        return self.worst > MAX_EXCESS
 
     @property
     def score(self) -> float:
@@ -80,14 +85,15 @@ def propose_merges(
     """
     motions = proposed_motions(a, b, pairs, centres, same)[:MAX_JUDGED]
     merges = _judged_motions(a, b, motions, judge)
-    merges.sort(key=lambda merge: -merge.score)
+    merges.sort(key=lambda merge: (merge.is_contradicted, -merge.score))
     return with_margins(merges)
 
 
 def with_margins(merges: Sequence[Merge]) -> list[Merge]:
-    """The merges, each with its margin over the others."""
+    """The merges, each with its margin over the others that nothing contradicts."""
+    rivals = [merge for merge in merges if not merge.is_contradicted]
     return [
-        replace(merge, margin=margin_over(merge.score, [m.score for m in merges if m is not merge]))
+        replace(merge, margin=margin_over(merge.score, [m.score for m in rivals if m is not merge]))
         for merge in merges
     ]
 
@@ -165,7 +171,7 @@ def _demoted(proposal: Proposal, excluded: Collection[tuple[int, int, int]]) -> 
 def off_edges(merge: Merge, a: Poses, b: Poses, judge: PairJudge) -> Merge:
     """The merge judged anew, edges forgiven, at poses of its scans that are all in one frame."""
     evidence = [judge.off_edges(i, j, a[i].inverse() @ b[j]) for i in sorted(a) for j in sorted(b)]
-    return replace(_summed(merge.a_from_b, merge.proposals, evidence), margin=merge.margin)
+    return replace(_summed(merge.a_from_b, merge.proposals, evidence, judge), margin=merge.margin)
 
 
 def judged_motion(a: Poses, b: Poses, a_from_b: Pose, judge: PairJudge) -> Merge:
@@ -182,12 +188,14 @@ def _judged_motions(a: Poses, b: Poses, motions: Sequence[Motion], judge: PairJu
         i_from_a = a[i].inverse()
         by_pair += [judge.poses(i, j, [i_from_a @ poses[j] for poses in moved]) for j in sorted(b)]
     return [
-        _summed(a_from_b, proposals, [evidence[n] for evidence in by_pair])
+        _summed(a_from_b, proposals, [evidence[n] for evidence in by_pair], judge)
         for n, (a_from_b, proposals) in enumerate(motions)
     ]
 
 
-def _summed(a_from_b: Pose, proposals: tuple[Proposal, ...], evidence: Sequence[Evidence]) -> Merge:
+def _summed(
+    a_from_b: Pose, proposals: tuple[Proposal, ...], evidence: Sequence[Evidence], judge: PairJudge
+) -> Merge:
     violated = [e.surface_violation for e in evidence]
     return Merge(
         a_from_b=a_from_b,
@@ -195,5 +203,5 @@ def _summed(a_from_b: Pose, proposals: tuple[Proposal, ...], evidence: Sequence[
         agree=sum(e.agree for e in evidence),
         violated=sum(violated),
         free=sum(e.free for e in evidence),
-        worst=max(v - 0.5 * e.agree for v, e in zip(violated, evidence, strict=True)),
+        worst=max(e.excess(judge.max_contradiction) for e in evidence),
     )

@@ -60,7 +60,7 @@ class PairProblem:
     def evaluate(self, i_from_j: Pose) -> Alternative:
         """A pose between the sensor frames with its evidence, by all samples."""
         evidence = mean_evidence(*two_way_evidence(self.i, self.j, i_from_j, self.tolerance))
-        patches = violating_patches(self.i, self.j, i_from_j, self.tolerance)
+        (patches,) = violating_patches(self.i, self.j, [i_from_j], self.tolerance)
         evidence = replace(evidence, patches=patches)
         return Alternative(i_from_j=i_from_j, evidence=evidence)
 

@@ -32,7 +32,9 @@ def learnt(registered: Registered, config: Config, stages: Stages) -> Registered
             config.pairs.max_contradiction,
         )
         counts["certain"] = sensor.num_certain
-        judge = replace(judge, tolerance=sensor.tolerance)
+        judge = replace(
+            judge, tolerance=sensor.tolerance, max_contradiction=sensor.max_contradiction
+        )
         pairs = _held(registered.pairs, scene, sensor)
     return replace(
         registered, scene=replace(scene, judge=judge, sensor=sensor), pairs=pairs
@@ -50,6 +52,8 @@ def _held(
             patches = pair.best.evidence.patches
             if sensor.tolerance > judge.tolerance:
                 pose = pair.best.i_from_j
-                patches = violating_patches(judge.fields[i], judge.fields[j], pose, sensor.tolerance)
+                (patches,) = violating_patches(
+                    judge.fields[i], judge.fields[j], [pose], sensor.tolerance
+                )
         held[i, j] = held_to(pair, sensor.max_contradiction, patches)
     return held

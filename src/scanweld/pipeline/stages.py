@@ -40,7 +40,12 @@ def lay_out(intake: Intake, config: Config, stages: Stages) -> Judge:
         # Here whatever the cluster: it is done faster than sent.
         fields = list(map_in_order(make_field, intake.prepared, stages.workers))
     tolerance = config.pairs.fine_tolerance_diameters * intake.diameter
-    return Judge(fields=fields, diameter=intake.diameter, tolerance=tolerance)
+    return Judge(
+        fields=fields,
+        diameter=intake.diameter,
+        tolerance=tolerance,
+        max_contradiction=config.pairs.max_contradiction,
+    )
 
 
 def place_scans(
