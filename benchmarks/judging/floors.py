@@ -8,6 +8,7 @@ from benchmarks.judging import outcomes as judged
 from benchmarks.judging.outcomes import Outcome, ScanOutcome, determined, share
 from benchmarks.scores import bound
 from benchmarks.sets import SETS
+from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Group
 from scanweld.reconstruction import Verdict
 
@@ -17,6 +18,10 @@ ASSERTED = 0.5
 """A pose with more confidence is asserted."""
 FACTOR_SLACK = 0.004
 """A factor that is named is this near to the true one."""
+NOT_MEASURED = "not measured"
+_NAMES_BODIES = re.compile(
+    r"did not move|stood still|moved by itself|more than one body|two bodies"
+)
 _NUMBER = re.compile(r"(\d+\.\d+)(\s*%)?")
 
 
@@ -49,7 +54,13 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
         _clean(determined(o for o in outcomes if o.group is Group.CLEAN)),
         _worst(outcomes, Group.HARD, MIN_HARD, "each hard condition alone"),
         _worst(outcomes, Group.CROP, MIN_CROP, "each crop alone"),
-        _scaled([scan for scan in scans if scan.factor != 1.0]),
+        *(
+            _kept(name, scenario.min_kept, [o for o in outcomes if o.scenario == name])
+            for name, scenario in SCENARIOS.items()
+            if scenario.min_kept is not None
+        ),
+        _two_bodies([outcome for outcome in outcomes if outcome.group is Group.TWO_BODIES]),
+        _scaled([s for o in outcomes if o.group is Group.SCALE for s in o.scans if s.factor != 1]),
         *_confidence(outcomes),
         _none(
             "runs that crash",
@@ -76,6 +87,11 @@ def names_factor(scan: ScanOutcome) -> bool:
     return "scale" in scan.reason and any(abs(f - t) < FACTOR_SLACK for f in factors for t in true)
 
 
+def names_bodies(outcome: Outcome) -> bool:
+    """Whether a run says that not all of what its scans show moves as one body."""
+    return _NAMES_BODIES.search(outcome.reason) is not None
+
+
 def _none(measure: str, counts: Mapping[str, int], runs: Sequence[Outcome]) -> Floor:
     """Something that must not happen in any of these runs; beside a zero stands its bound."""
     told = ", ".join(f"{count} {of}" for of, count in counts.items())
@@ -94,6 +110,27 @@ def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     measure = f"symmetric and sliding objects: pose asserted with confidence > {ASSERTED:g}"
     found = _none(measure, counts, [o for o in outcomes if any(s.is_open for s in o.scans)])
     return found if scans else found._replace(is_met=None)
+
+
+def _kept(name: str, asked: float, outcomes: Sequence[Outcome]) -> Floor:
+    """What is right and not doubted, where sensors and files are as bad as they are."""
+    scans = determined(outcomes)
+    reached = share(scans, "is_right", "is_good")
+    measure, floor = f"{name}: scans that are right and called good", f">= {100 * asked:g} %"
+    if not scans:
+        return Floor(measure, floor, NOT_MEASURED, None)
+    return Floor(measure, floor, f"{100 * reached:.1f} % of {len(scans)}", reached >= asked)
+
+
+def _two_bodies(outcomes: Sequence[Outcome]) -> Floor:
+    """Runs in which a part moves by itself, or the background stands still as the object turns."""
+    good = sum(outcome.verdict == Verdict.GOOD for outcome in outcomes)
+    named = sum(map(names_bodies, outcomes))
+    measure = "not all moves as one body: called good; the reason names it"
+    if not outcomes:
+        return Floor(measure, "0; all", NOT_MEASURED, None)
+    told = f"{good} of {len(outcomes)} good, the reason names it in {named}"
+    return Floor(measure, "0; all", told, not good and named == len(outcomes))
 
 
 def _scaled(scans: Sequence[ScanOutcome]) -> Floor:
@@ -117,7 +154,7 @@ def _worst(outcomes: Sequence[Outcome], group: Group, floor: float, told: str) -
     shares = {name: share(some, "is_right") for name, some in scans.items()}
     missed = [name for name in shares if not shares[name] >= floor]
     worst = min(shares, key=lambda name: shares[name], default="none")
-    reached = f"least: {worst}, {100 * shares[worst]:.0f} %" if shares else "not measured"
+    reached = f"least: {worst}, {100 * shares[worst]:.0f} %" if shares else NOT_MEASURED
     if missed:
         reached += f"; {len(missed)} of {len(shares)} below"
     measure, is_met = f"{told}: right, of the scans that belong", not missed if shares else None

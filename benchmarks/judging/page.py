@@ -116,7 +116,7 @@ def _misses(outcome: Outcome) -> Iterator[Json]:
             yield {**head, "scan": scan}
     asked = determined([outcome])
     missing = [scan for scan in asked if not scan.is_right]
-    if missing and outcome.group not in (Group.SYMMETRIC, Group.REPORTED):
+    if missing and outcome.group not in (Group.SYMMETRIC, Group.REPORTED, Group.TWO_BODIES):
         yield {**head, "missing": len(missing), "asked": len(asked), "scan": missing[0]}
 
 

@@ -69,6 +69,7 @@ def try_out(scenario: str, seed: int) -> Outcome:
     try:
         found = run(scene.scans, CONFIG, workers=1)
         verdict, (scans, pairs) = str(found.verdict), judge(found, scene)
+        reason = "; ".join(found.reasons)
     except ScanweldError as error:
         verdict, reason = ERROR, str(error)
     except Exception:
@@ -83,8 +84,13 @@ def judge(
 ) -> tuple[tuple[ScanOutcome, ...], tuple[PairOutcome | None, ...]]:
     """What became of every scan and every pair, in the order of their names."""
     estimate = PoseSet(poses=dict(found.poses), components=found.components)
-    truth = {"centroids": scene.centroids, "diameter": scene.diameter}
-    errors = evaluate_poses(estimate, scene.truth, **truth)
+    errors = evaluate_poses(
+        estimate,
+        scene.truth,
+        centroids=scene.centroids,
+        diameter=scene.diameter,
+        limits=scene.limits,
+    )
     names = sorted(scene.sources)
     reports = {(pair.i, pair.j): pair for pair in found.pairs}
     return (
@@ -100,7 +106,8 @@ def is_right_pair(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool:
         return False
     off = (scene.truth[i].inverse() @ scene.truth[j]).inverse() @ i_from_j
     shift_percent = 100.0 * off.shift_at(scene.centroids[j]) / scene.diameter
-    return off.angle_deg() <= PAIR_DEG and shift_percent <= PAIR_PERCENT
+    max_deg, max_percent = np.maximum(scene.limits, (PAIR_DEG, PAIR_PERCENT))
+    return bool(off.angle_deg() <= max_deg and shift_percent <= max_percent)
 
 
 def _scan(name: str, scene: Scene, **found: Any) -> ScanOutcome:

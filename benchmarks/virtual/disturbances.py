@@ -11,14 +11,12 @@ import numpy as np
 from scipy import ndimage
 
 from benchmarks.virtual.bodies import Rng, make_body
+from benchmarks.virtual.depth_images import JUMP_DIAMETERS, depth_of, silhouette, with_depth
 from benchmarks.virtual.shots import SLIGHT, Shot, Views, ring, take_shots
-from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.grid import grid_faces
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
 
-JUMP_DIAMETERS = 0.03
-"""Depth step that counts as a jump between two surfaces."""
 FLYING_SHARE = 0.6
 """Share of the pixels beside a jump that are measured in between."""
 LIKE = 500
@@ -26,6 +24,8 @@ LIKE = 500
 NOISE_RADIUS = 0.35
 """Of the disc of noise, in widths of the image."""
 
+Range = tuple[float, float]
+"""Least and most of a setting."""
 Disturbance = Callable[[list[Shot], Rng], list[Shot]]
 Strangers = Callable[[int, Rng], list[Shot]]
 """Scans besides those of the object of this seed."""
@@ -36,26 +36,61 @@ def each(change: Callable[..., RangeScan], **settings: float) -> Disturbance:
     return lambda shots, rng: [replace(s, scan=change(s.scan, rng, **settings)) for s in shots]
 
 
+def drawn(change: Callable[..., RangeScan], **ranges: Range) -> Disturbance:
+    """A change that happens to every scan, with settings that are drawn once a run."""
+
+    def disturb(shots: list[Shot], rng: Rng) -> list[Shot]:
+        settings = {name: rng.uniform(*limits) for name, limits in ranges.items()}
+        return each(change, **settings)(shots, rng)
+
+    return disturb
+
+
+def alike(disturbance: Disturbance) -> Disturbance:
+    """The same draws for every scan: what stays as it is in front of the sensor errs alike."""
+
+    def disturb(shots: list[Shot], rng: Rng) -> list[Shot]:
+        seed = int(rng.integers(2**32))
+        return [disturbance([shot], np.random.default_rng(seed))[0] for shot in shots]
+
+    return disturb
+
+
+def in_turn(*disturbances: Disturbance) -> Disturbance:
+    """One after the other."""
+
+    def disturb(shots: list[Shot], rng: Rng) -> list[Shot]:
+        for disturbance in disturbances:
+            shots = disturbance(shots, rng)
+        return shots
+
+    return disturb
+
+
+def one_of(*disturbances: Disturbance) -> Disturbance:
+    """One of some, drawn once a run."""
+    return lambda shots, rng: disturbances[int(rng.integers(len(disturbances)))](shots, rng)
+
+
 # Errors of the sensor
 
 
 def outlier_points(scan: RangeScan, rng: Rng, share: float) -> RangeScan:
     """Pixels whose depth is drawn anew from a wider range than the object's."""
-    depth = _depth_of(scan)
+    depth = depth_of(scan)
     seen = np.isfinite(depth)
     low, high = depth[seen].min(), depth[seen].max()
     slack = 0.2 * (high - low)
     hit = seen & (rng.random(depth.shape) < share)
     depth[hit] = rng.uniform(low - slack, high + slack, size=int(hit.sum()))
-    return _with_depth(scan, depth)
+    return with_depth(scan, depth)
 
 
 def flying_pixels(scan: RangeScan, rng: Rng) -> RangeScan:
     """Pixels beside a jump, and beside the silhouette, measured somewhere in between."""
-    depth, size = _depth_of(scan), principal_diameter(scan.points)
+    depth, size = depth_of(scan), principal_diameter(scan.points)
     seen = np.isfinite(depth)
-    # A lost return is a gap in the surface, not a look past it.
-    is_past = np.logical_not(ndimage.binary_closing(seen, np.ones((3, 3))))
+    is_past = ~silhouette(depth)
     behind = np.where(seen, depth, np.where(is_past, np.nanmax(depth) + 0.3 * size, -np.inf))
     far = ndimage.maximum_filter(behind, size=3)
     near = ndimage.minimum_filter(np.where(seen, depth, np.inf), size=3)
@@ -63,17 +98,17 @@ def flying_pixels(scan: RangeScan, rng: Rng) -> RangeScan:
     chosen = beside & (rng.random(depth.shape) < FLYING_SHARE)
     part = rng.random(int(chosen.sum()))
     depth[chosen] = near[chosen] + part * (far - near)[chosen]
-    return _with_depth(scan, depth)
+    return with_depth(scan, depth)
 
 
 def scaled(shots: list[Shot], rng: Rng, factor: float) -> list[Shot]:
     """The first scan is too large, as from a sensor whose ranges are all too long."""
-    shot = shots[0].named(f"{shots[0].scan.name} scaled")
-    # Where it fits best, its middle comes to lie where it belongs.
-    shift = (1.0 - factor) * shot.scan.points.mean(axis=0)
-    pose = shot.pose @ Pose(rotation=np.eye(3), translation=shift)
-    larger = replace(shot.scan, points=factor * shot.scan.points)
-    return [replace(shot, scan=larger, factor=factor, world_from_sensor=pose), *shots[1:]]
+    return [_larger(shots[0], factor).named(f"{shots[0].scan.name} scaled"), *shots[1:]]
+
+
+def scales(shots: list[Shot], rng: Rng, within: float) -> list[Shot]:
+    """Every scan has a scale of its own, as from a sensor that was calibrated badly."""
+    return [_larger(shot, 1.0 + rng.uniform(-within, within)) for shot in shots]
 
 
 def mirrored(shots: list[Shot], rng: Rng) -> list[Shot]:
@@ -144,6 +179,12 @@ def as_points(scan: RangeScan, rng: Rng) -> RangeScan:
     return RangeScan(name=scan.name, points=rng.permutation(scan.points, axis=0))
 
 
+def as_points_seen(scan: RangeScan, rng: Rng) -> RangeScan:
+    """Points in random order, and where the sensor stood."""
+    points = as_points(scan, rng)
+    return replace(points, scan_from_sensor=scan.scan_from_sensor, viewpoint=scan.viewpoint)
+
+
 def as_mesh(scan: RangeScan, rng: Rng) -> RangeScan:
     """Points and faces, cut at jumps."""
     assert scan.grid is not None
@@ -171,12 +212,12 @@ def half_of(seed: int, rng: Rng, *, body: str, views: Views, seeds_on: int = 0) 
 def noise_scan(seed: int, rng: Rng) -> list[Shot]:
     """One scan of nothing but noise in the middle of the image."""
     scan = _shots_of("thing", seed, lambda b, r: ring(b, r, count=1), rng)[0].scan
-    depth = _depth_of(scan)
+    depth = depth_of(scan)
     rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
     half = 0.5 * np.array(depth.shape)
     disc = np.hypot(rows - half[0], columns - half[1]) < NOISE_RADIUS * min(depth.shape)
     drawn = rng.uniform(np.nanmin(depth), np.nanmax(depth), size=depth.shape)
-    noise = _with_depth(scan, np.where(disc, drawn, np.nan))
+    noise = with_depth(scan, np.where(disc, drawn, np.nan))
     return [Shot(scan=replace(noise, name="noise"), world_from_sensor=None)]
 
 
@@ -185,23 +226,15 @@ def far_away(rng: Rng) -> Pose:
     return Pose(rotation=random_rotation(rng), translation=rng.uniform(500, 1000, size=3))
 
 
+def _larger(shot: Shot, factor: float) -> Shot:
+    """A scan that is too large, where it fits best: its middle lies where it belongs."""
+    shift = (1.0 - factor) * shot.scan.points.mean(axis=0)
+    pose = shot.pose @ Pose(rotation=np.eye(3), translation=shift)
+    larger = replace(shot.scan, points=factor * shot.scan.points)
+    return replace(shot, scan=larger, factor=factor, world_from_sensor=pose)
+
+
 def _shots_of(name: str, seed: int, views: Views, rng: Rng) -> list[Shot]:
     body = make_body(name, seed)
     shots = take_shots(body, views(body, rng), SLIGHT, seed + 1)
     return [shot.named(f"other {shot.scan.name}") for shot in shots]
-
-
-def _depth_of(scan: RangeScan) -> FloatArray:
-    """Depth (H, W) of a scan in its sensor's frame, NaN where nothing was seen."""
-    assert scan.grid is not None
-    return np.where(scan.grid >= 0, scan.points[scan.grid, 2], np.nan)
-
-
-def _with_depth(scan: RangeScan, depth: FloatArray) -> RangeScan:
-    """The scan with other depths (H, W), NaN for none."""
-    assert scan.camera is not None
-    seen = np.isfinite(depth)
-    grid = np.full(depth.shape, -1, dtype=np.int64)
-    grid[seen] = np.arange(int(seen.sum()))
-    points = scan.camera.unproject_image(depth)[seen]
-    return replace(scan, points=points, grid=grid, colors=None)

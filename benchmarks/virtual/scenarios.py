@@ -5,7 +5,9 @@ from dataclasses import replace
 from functools import partial
 
 from benchmarks.virtual import disturbances as harm
-from benchmarks.virtual.disturbances import each
+from benchmarks.virtual import sensors, trims
+from benchmarks.virtual.disturbances import Disturbance, alike, drawn, each, in_turn, one_of
+from benchmarks.virtual.rooms import in_standing_room, turned_before_sensor, with_lid_opened
 from benchmarks.virtual.scene import Group, Scenario
 from benchmarks.virtual.scenery import (
     held_by_hand,
@@ -15,6 +17,7 @@ from benchmarks.virtual.scenery import (
     turned_over,
 )
 from benchmarks.virtual.shots import SLIGHT, on_sphere, ring, twice
+from scanweld.evaluation.metrics import Limits
 from scanweld.geometry.camera import CameraModel
 
 SCALE = 1.01
@@ -22,14 +25,47 @@ SCALE = 1.01
 FROM_ABOVE_DEG = (25.0, 40.0)
 """Elevations from which a table is seen, and whatever stands on it."""
 
+BASIN = Limits(rotation_deg=5.0, translation_percent=4.0)
+"""Where a sensor's own error moves the best pose, that of the right basin is right."""
+
 SIX, FIVE, EIGHT = (partial(ring, count=count) for count in (6, 5, 8))
 ARC = partial(SIX, step_deg=25.0)
 ABOVE = partial(SIX, elevations_deg=FROM_ABOVE_DEG)
 TURNED = partial(turned_over, half=partial(FIVE, elevations_deg=FROM_ABOVE_DEG))
+TURNTABLE = partial(turned_before_sensor, count=6)
 BALL = partial(harm.crop_to_ball, radius_diameters=0.25)
 GRIDS = each(harm.without_camera)
 POINTS = each(harm.as_points)
 OTHERS = partial(harm.half_of, views=SIX)
+
+TRIMMED = in_turn(
+    drawn(sensors.without_grazing, max_incidence_deg=(60.0, 78.0)),
+    one_of(
+        drawn(trims.trimmed_along_curve, share=(0.7, 0.95)), drawn(trims.boxed, share=(0.7, 0.95))
+    ),
+    drawn(trims.with_holes, count=(0.0, 4.0), radius_diameters=(0.02, 0.06)),
+)
+"""Range maps as people leave them."""
+NO_GRID = one_of(POINTS, each(harm.as_points_seen))
+
+
+def stereo(rms: harm.Range, length: harm.Range) -> tuple[Disturbance, ...]:
+    """A depth camera of two eyes, the object cut out; lengths in diameters of it."""
+    return (
+        drawn(sensors.depth_waves, rms_diameters=rms, length_diameters=length),
+        drawn(sensors.stereo_shadow, baseline_diameters=(0.1, 0.3)),
+        drawn(sensors.eaten_edges, least=(0.0, 1.5), most=(1.5, 4.0)),
+        drawn(sensors.quantised, step_diameters=(0.001, 0.005)),
+    )
+
+
+WHOLE_FRAMES = (
+    # The room is about five times as large as the object, and errs alike as long as it stands.
+    alike(drawn(sensors.depth_waves, of_depth=(0.002, 0.01), length_diameters=(0.05, 0.1))),
+    drawn(sensors.stereo_shadow, baseline_diameters=(0.02, 0.06)),
+    drawn(sensors.eaten_edges, least=(0.0, 1.0), most=(1.0, 3.0)),
+    drawn(sensors.quantised, step_diameters=(0.0003, 0.001)),
+)
 
 _noise = partial(replace, SLIGHT)
 _hard = partial(replace, Scenario(group=Group.HARD, seeds=8, views=SIX))
@@ -39,6 +75,10 @@ _crop = partial(_hard, group=Group.CROP, seeds=6)
 _symmetric = partial(_hard, group=Group.SYMMETRIC, seeds=5, views=FIVE, min_overlap=0.0)
 """Solids of which no pose of a scan is the only one."""
 _reported = partial(_hard, group=Group.REPORTED, seeds=5)
+_sensor = partial(_hard, group=Group.SENSOR)
+"""What real sensors do, and files that say less, with settings drawn from ranges."""
+_two_bodies = partial(_hard, group=Group.TWO_BODIES, taking=in_standing_room)
+"""Not all that is seen moves as one body."""
 
 SCENARIOS: Mapping[str, Scenario] = {
     # Nothing goes wrong
@@ -77,11 +117,25 @@ SCENARIOS: Mapping[str, Scenario] = {
     "duplicates": _hard(seeds=6, disturbances=(partial(harm.again, count=3),)),
     "near-duplicates": _hard(seeds=6, views=partial(twice, views=SIX, count=3, apart_deg=0.5)),
     # Nearly symmetric
+    "taken twice": _hard(seeds=6, views=partial(twice, views=SIX, count=3, apart_deg=0.0)),
     "figure with a mirror plane": _hard(body="mirror figure"),
     "vase with a knob": _hard(seeds=6, body="marked vase"),
     "gear with a worn tooth": _hard(
         seeds=6, body="marked gear", views=partial(SIX, elevations_deg=(35.0, 20.0))
     ),
+    # Real sensors
+    "trimmed maps": _sensor(views=EIGHT, crop=TRIMMED, min_kept=0.95),
+    "no grid": _sensor(disturbances=(NO_GRID,), min_kept=0.97),
+    "correlated error 1.5 %": _sensor(
+        disturbances=stereo(rms=(0.012, 0.018), length=(0.15, 0.5)), limits=BASIN, min_kept=0.85
+    ),
+    "correlated error 0.5 %": _sensor(
+        disturbances=stereo(rms=(0.003, 0.007), length=(0.15, 0.5)), limits=BASIN
+    ),
+    "scale +-2 %": _sensor(disturbances=(partial(harm.scales, within=0.02),), limits=BASIN),
+    # Not all that is seen moves as one body
+    "standing background": _two_bodies(views=TURNTABLE, disturbances=WHOLE_FRAMES),
+    "lid opened": _two_bodies(views=EIGHT, taking=with_lid_opened),
     # Symmetric
     **{name: _symmetric(body=name) for name in ("sphere", "cylinder", "cone", "box", "plate")},
     "vase": _symmetric(body="vase"),

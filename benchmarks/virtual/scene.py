@@ -1,7 +1,7 @@
 """A scene: scans under neutral names in random frames, and the truth about them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -9,10 +9,10 @@ import numpy as np
 from benchmarks.virtual.bodies import Body, make_body
 from benchmarks.virtual.disturbances import Disturbance, Strangers
 from benchmarks.virtual.shots import SLIGHT, Shot, Taking, Views, is_chain, take_shots
-from scanweld.evaluation.metrics import object_diameter, scan_centroids
+from scanweld.evaluation.metrics import RIGHT, Limits, object_diameter
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import View
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import RangeScan, principal_diameter
@@ -34,6 +34,8 @@ class Group(StrEnum):
     CROP = "crop"
     SCALE = "scale"
     SYMMETRIC = "symmetric"
+    SENSOR = "sensor"
+    TWO_BODIES = "two bodies"
     REPORTED = "reported"
 
 
@@ -54,6 +56,9 @@ class Scenario:
     min_overlap: float = CHAIN_OVERLAP
     # Whether the first scan is not to be placed, so that the others have to be connected without it
     spoils_first: bool = False
+    limits: Limits = RIGHT  # Within which a pose is right
+    # Share of the scans that belong that are right and called good, at least; None: is not asked
+    min_kept: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -69,7 +74,10 @@ class Scene:
     # do not see the one mark
     is_open: frozenset[str]
     diameter: float  # Of the object, or of what a crop left of it
-    centroids: dict[str, FloatArray]  # Of each scan, in its frame
+    centroids: dict[str, FloatArray]  # Of what each scan shows of the object, in its frame
+    limits: Limits = RIGHT  # Within which a pose is right
+    # (N,) points that lie on the object, of the scans that show much else
+    on_object: dict[str, BoolArray] = field(default_factory=dict)
 
 
 def make_scene(scenario: Scenario, seed: int) -> Scene:
@@ -94,7 +102,8 @@ def make_scene(scenario: Scenario, seed: int) -> Scene:
     if scenario.strangers:
         shots = shots + scenario.strangers(seed, rng)
     left = object_diameter([s.scan for s in bare], {s.scan.name: s.pose for s in bare})
-    return posed(shots, body, min(left, principal_diameter(body.mesh.vertices)), seed)
+    scene = posed(shots, body, min(left, principal_diameter(body.mesh.vertices)), seed)
+    return replace(scene, limits=scenario.limits)
 
 
 def mark_pixels(body: Body, views: Sequence[View]) -> list[int]:
@@ -152,6 +161,7 @@ def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scen
         scans.append(replace(shot.scan, name=name, points=points, scan_from_sensor=sensor))
         if shot.world_from_sensor is not None:
             truth[name] = shot.world_from_sensor @ motion.inverse()
+    on_object = {name: shot.on_object for name, shot in of.items() if shot.mask is not None}
     is_open = {n for n, s in of.items() if (body.is_symmetric or not s.sees_mark) and s.world == 0}
     return Scene(
         scans=scans,
@@ -161,5 +171,12 @@ def posed(shots: Sequence[Shot], body: Body, diameter: float, seed: int) -> Scen
         factors={name: shot.factor for name, shot in of.items() if shot.factor != 1.0},
         is_open=frozenset(is_open & set(truth)),
         diameter=diameter,
-        centroids=scan_centroids(scans),
+        centroids={s.name: _middle_of(s, on_object.get(s.name)) for s in scans},
+        on_object=on_object,
     )
+
+
+def _middle_of(scan: RangeScan, on_object: BoolArray | None) -> FloatArray:
+    """Mean (3,) of the points of a scan, or of those that lie on the object."""
+    points = scan.points if on_object is None else scan.points[on_object]
+    return points.mean(axis=0)

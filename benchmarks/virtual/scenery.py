@@ -1,6 +1,6 @@
 """What is scanned together with the object: a table, a turntable, hands."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +37,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def on_table(body: Body, views: list[View], noise: NoiseModel, seed: int) -> list[Shot]:
     """The object stands on a table that fills the rest of the image."""
-    return _take_beside(body, [_table(body, UP)] * len(views), views, noise, seed)
+    return take_beside(body, [_table(body, UP)] * len(views), views, noise, seed)
 
 
 def on_turntable(body: Body, views: list[View], noise: NoiseModel, seed: int) -> list[Shot]:
@@ -46,7 +46,7 @@ def on_turntable(body: Body, views: list[View], noise: NoiseModel, seed: int) ->
     low = body.mesh.vertices[:, 2].min()
     place = np.array([*middle(body.mesh)[:2], low - 0.01 * size])
     disc = shifted(cylinder(DISC_DIAMETERS * size, 0.02 * size), place)
-    return _take_beside(body, [disc] * len(views), views, noise, seed)
+    return take_beside(body, [disc] * len(views), views, noise, seed)
 
 
 def turned_over(body: Body, rng: Rng, *, half: Views) -> list[View]:
@@ -63,16 +63,44 @@ def on_table_turned_over(body: Body, views: list[View], noise: NoiseModel, seed:
     """The object stands on the table in the first half of the views, and lies in the second."""
     tables = [_table(body, UP), _table(body, OVER.T @ UP)]
     under = [tables[2 * k // len(views)] for k in range(len(views))]
-    return _take_beside(body, under, views, noise, seed)
+    return take_beside(body, under, views, noise, seed)
 
 
-def held_by_hand(body: Body, views: list[View], noise: NoiseModel, seed: int) -> list[Shot]:
-    """In two views an arm reaches into the image and holds the object, elsewhere each time."""
+def held_by_hand(
+    body: Body, views: list[View], noise: NoiseModel, seed: int, num_held: int = NUM_HELD
+) -> list[Shot]:
+    """In some views an arm reaches into the image and holds the object, elsewhere each time."""
     rng = np.random.default_rng([seed, 4])
-    held = {k * len(views) // NUM_HELD for k in range(NUM_HELD)}
+    held = {k * len(views) // num_held for k in range(num_held)}
     arms = [_arm(body, view, rng) if k in held else None for k, view in enumerate(views)]
-    shots = _take_beside(body, arms, views, noise, seed)
+    shots = take_beside(body, arms, views, noise, seed)
     return [s.named(f"{k} held") if k in held else s for k, s in enumerate(shots)]
+
+
+def wider(view: View) -> View:
+    """The same view in a wider image."""
+    c, more = view.camera, int(ROOM * view.camera.width)
+    size = {"width": c.width + 2 * more, "height": c.height + 2 * more}
+    return replace(view, camera=replace(c, **size, cx=c.cx + more, cy=c.cy + more))
+
+
+def take_beside(
+    body: Body,
+    sceneries: Sequence[TriangleMesh | None],
+    views: list[View],
+    noise: NoiseModel,
+    seed: int,
+    frame: Callable[[View], View] = wider,
+) -> list[Shot]:
+    """Scans of the object and, for each view, what is beside it, in wider images or as said."""
+    size, shots = principal_diameter(body.mesh.vertices), []
+    for k, (scenery, view) in enumerate(zip(sceneries, views, strict=True)):
+        mesh = body.mesh if scenery is None else joined(body.mesh, scenery)
+        # The scanner's noise is a share of all that is scanned, ours one of the object.
+        smaller = size / principal_diameter(mesh.vertices)
+        less = replace(noise, depth_diameters=noise.depth_diameters * smaller)
+        shots.append(take(mesh, frame(view), less, seed, k))
+    return shots
 
 
 def _share_beside(body: Body, scenery: TriangleMesh, view: View) -> float:
@@ -81,30 +109,6 @@ def _share_beside(body: Body, scenery: TriangleMesh, view: View) -> float:
     vertices = view.world_from_sensor.inverse().apply(both.vertices)
     _, face_of = render_depth(vertices, both.faces, view.camera)
     return float((face_of >= len(body.mesh.faces)).sum() / (face_of >= 0).sum())
-
-
-def _take_beside(
-    body: Body,
-    sceneries: Sequence[TriangleMesh | None],
-    views: list[View],
-    noise: NoiseModel,
-    seed: int,
-) -> list[Shot]:
-    """Scans of the object and, for each view, what is beside it, in wider images."""
-    size, shots = principal_diameter(body.mesh.vertices), []
-    for k, (scenery, view) in enumerate(zip(sceneries, views, strict=True)):
-        mesh = body.mesh if scenery is None else joined(body.mesh, scenery)
-        # The scanner's noise is a share of all that is scanned, ours one of the object.
-        smaller = size / principal_diameter(mesh.vertices)
-        less = replace(noise, depth_diameters=noise.depth_diameters * smaller)
-        shots.append(take(mesh, _wider(view), less, seed, k))
-    return shots
-
-
-def _wider(view: View) -> View:
-    c, more = view.camera, int(ROOM * view.camera.width)
-    size = {"width": c.width + 2 * more, "height": c.height + 2 * more}
-    return replace(view, camera=replace(c, **size, cx=c.cx + more, cy=c.cy + more))
 
 
 def _table(body: Body, up: FloatArray) -> TriangleMesh:
@@ -134,7 +138,7 @@ def _arm(body: Body, view: View, rng: Rng) -> TriangleMesh:
     direction = np.array([*outwards[spot] / aside, TOWARDS]) / np.hypot(1.0, TOWARDS)
     start, along = view.world_from_sensor.apply(seen[spot]), view.world_from_sensor.turn(direction)
     arms = [_arm_along(start, along, radius * size, 1.2 * size) for radius in ARM_DIAMETERS]
-    off = [abs(_share_beside(body, arm, _wider(view)) - HAND) for arm in arms]
+    off = [abs(_share_beside(body, arm, wider(view)) - HAND) for arm in arms]
     return arms[int(np.argmin(off))]
 
 

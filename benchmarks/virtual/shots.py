@@ -39,6 +39,7 @@ class Shot:
     world: int = 0  # Number of the world: 0 for the object, another one for another object
     factor: float = 1.0  # By which the scan is too large
     sees_mark: bool = True  # Whether the scan shows what tells the object from a symmetric one
+    mask: BoolArray | None = None  # (H, W) pixels that see the object; None if all of them do
 
     @property
     def pose(self) -> Pose:
@@ -50,6 +51,14 @@ class Shot:
     def world_points(self) -> FloatArray:
         """(N, 3)."""
         return self.pose.apply(self.scan.points)
+
+    @property
+    def on_object(self) -> BoolArray:
+        """(N,) points that lie on the object, of a scan that still has its grid."""
+        assert self.mask is not None and self.scan.grid is not None
+        on_object = np.zeros(len(self.scan.points), dtype=bool)
+        on_object[self.scan.grid[self.mask & (self.scan.grid >= 0)]] = True
+        return on_object
 
     def only(self, kept: BoolArray) -> "Shot":
         """Some of the points."""

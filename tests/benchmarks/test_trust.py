@@ -19,7 +19,7 @@ from benchmarks.kept import Record, Study, measured
 from benchmarks.results import DOCS
 from benchmarks.scores import Stated, bound
 from benchmarks.seeds import FIRST_FRESH
-from benchmarks.virtual.scenarios import SCENARIOS
+from benchmarks.virtual.scenarios import BASIN, SCENARIOS
 from benchmarks.virtual.scene import Scene, make_scene
 from scanweld.errors import InputError
 from scanweld.geometry.pose import Pose
@@ -91,7 +91,7 @@ def test_a_run_that_tells_the_truth_is_right():
     assert told("trust-misses", outcome) == "None.\n"
     assert floor_of([outcome], "AUC").asked == ">= 0.99"
     names = [floor.measure for floor in floors([])]
-    assert len(names) == len(set(names)) == 10
+    assert len(names) == len(set(names)) == 14
 
 
 def test_a_wrong_scan_is_falsely_good_only_if_it_is_called_good():
@@ -239,6 +239,38 @@ def test_the_worst_condition_is_told():
     bad = replace(true, scenario="hand", scans=lost + true.scans[2:])
     floor = floor_of([replace(true, scenario="table"), bad], "hard condition")
     assert floor.is_met is False and floor.reached == "least: hand, 67 %; 1 of 2 below"
+
+
+def test_what_sensors_do_is_asked_to_be_right_and_not_doubted():
+    true = replace(outcome_of(CLEAN), scenario="trimmed maps")
+    measure = "trimmed maps: scans that are right and called good"
+    assert is_met(true, measure) and floor_of([], measure).is_met is None
+    doubted = tuple(s._replace(verdict="doubtful") for s in true.scans[:1])
+    floor = floor_of([replace(true, scans=doubted + true.scans[1:])], measure)
+    assert floor.is_met is False and floor.reached == "83.3 % of 6" and floor.asked == ">= 95 %"
+
+
+def test_two_bodies_are_never_good_and_the_reason_names_them():
+    measure = "not all moves as one body"
+    for verdict, reason, told in (
+        ("doubtful", "the camera did not move; what was laid together stood still", True),
+        ("doubtful", "all of its scans are doubtful", False),
+        ("good", "the camera did not move", False),
+    ):
+        run = replace(outcome_of(CLEAN), scenario="standing background")
+        assert is_met(replace(run, verdict=verdict, reason=reason), measure) is told
+    assert floor_of([outcome_of(CLEAN)], measure).is_met is None
+
+
+def test_a_pose_is_right_within_the_limits_of_its_scene():
+    scene, found = scene_of(CLEAN), told_as_true(scene_of(CLEAN))
+    centre, pose = scene.centroids["scan_03"], found.poses["scan_03"]
+    turn = Pose.exp([0.0, 0.0, np.radians(4.0), 0.0, 0.0, 0.0]).rotation
+    moved = pose @ Pose(rotation=turn, translation=centre - turn @ centre)
+    found = replace(found, poses={**found.poses, "scan_03": moved})
+    for limits, num_right in ((scene.limits, 5), (BASIN, 6)):
+        scans, _ = judge(found, replace(scene, limits=limits))
+        assert sum(scan.is_right for scan in scans) == num_right
 
 
 def test_kinds_of_pairs_are_counted_and_a_zero_is_told_with_its_bound():

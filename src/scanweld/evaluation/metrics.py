@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,16 @@ MAX_ROTATION_DEG = 3.0
 """A scan turned by more than this is wrong."""
 MAX_TRANSLATION_PERCENT = 1.5
 """A scan shifted by more than this share of the object's diameter is wrong."""
+
+
+class Limits(NamedTuple):
+    """What is still right: degrees, and percent of the object's diameter."""
+
+    rotation_deg: float
+    translation_percent: float
+
+
+RIGHT = Limits(MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT)
 
 
 class Standing(StrEnum):
@@ -110,6 +121,7 @@ def evaluate_poses(
     *,
     centroids: Mapping[str, FloatArray] | None = None,
     diameter: float | None = None,
+    limits: Limits = RIGHT,
 ) -> PoseErrors:
     """Compare estimated poses with reference poses.
 
@@ -124,6 +136,7 @@ def evaluate_poses(
             another object, say) counts as wrong.
         centroids: Point (3,) of each scan, scan frame, where its translation is taken.
         diameter: Of the object, in the scans' unit.
+        limits: What is still right.
 
     Raises:
         InputError: If the two have no scan in common.
@@ -141,11 +154,15 @@ def evaluate_poses(
         errors.update({name: ScanError(standing=Standing.WRONG) for name in component})
         gauges = [reference[name] @ placed[name].inverse() for name in known]
         candidates = [
-            {k: _scan_error(g, placed[k], reference[k], _at(centroids, k), diameter) for k in known}
-            for g in gauges
+            {
+                name: _scan_error(off, off.shift_at(_at(centroids, name)), diameter, limits)
+                for name in known
+                for off in [reference[name].inverse() @ gauge @ placed[name]]
+            }
+            for gauge in gauges
         ]
         if candidates:
-            errors.update(min(candidates, key=lambda each: _badness(each, diameter)))
+            errors.update(min(candidates, key=lambda each: _badness(each, diameter, limits)))
     return PoseErrors(scans=errors, diameter=diameter)
 
 
@@ -170,23 +187,23 @@ def _at(centroids: Mapping[str, FloatArray] | None, name: str) -> FloatArray:
     return np.zeros(3) if centroids is None else centroids[name]
 
 
-def _scan_error(
-    gauge: Pose, estimate: Pose, reference: Pose, centroid: FloatArray, diameter: float | None
-) -> ScanError:
-    off = reference.inverse() @ gauge @ estimate
-    rotation, translation = off.angle_deg(), off.shift_at(centroid)
-    is_right = rotation <= MAX_ROTATION_DEG and (
-        diameter is None or 100.0 * translation <= MAX_TRANSLATION_PERCENT * diameter
+def _scan_error(off: Pose, shift: float, diameter: float | None, limits: Limits) -> ScanError:
+    """What a pose that is off by a motion, and shifts the centroid by as much, is worth."""
+    rotation = off.angle_deg()
+    is_right = rotation <= limits.rotation_deg and (
+        diameter is None or 100.0 * shift <= limits.translation_percent * diameter
     )
     standing = Standing.RIGHT if is_right else Standing.WRONG
-    return ScanError(standing=standing, rotation_deg=rotation, translation=translation)
+    return ScanError(standing=standing, rotation_deg=rotation, translation=shift)
 
 
-def _badness(errors: Mapping[str, ScanError], diameter: float | None) -> tuple[int, float]:
+def _badness(
+    errors: Mapping[str, ScanError], diameter: float | None, limits: Limits
+) -> tuple[int, float]:
     """What the best gauge has least of: wrong scans, then mean error."""
-    rotation = np.mean([error.rotation_deg for error in errors.values()]) / MAX_ROTATION_DEG
+    rotation = np.mean([error.rotation_deg for error in errors.values()]) / limits.rotation_deg
     translation = np.mean([error.translation for error in errors.values()])
     num_wrong = sum(error.standing is Standing.WRONG for error in errors.values())
     if diameter is None:
         return num_wrong, float(rotation)
-    return num_wrong, float(rotation + 100.0 * translation / diameter / MAX_TRANSLATION_PERCENT)
+    return num_wrong, float(rotation + 100.0 * translation / diameter / limits.translation_percent)
