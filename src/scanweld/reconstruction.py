@@ -63,6 +63,9 @@ class ScanReport:
         confidence: Probability that it is placed rightly beside the others of its component; None
             if unplaced.
         grounds: What the confidence rests on, see docs/report.md.
+        rotation_bound_deg: Its rotation beside the others of its component is off by no more, at
+            95 %, if it is placed rightly; None if unplaced.
+        translation_bound: The same of its centroid, in the scans' unit.
     """
 
     verdict: ScanVerdict
@@ -82,6 +85,8 @@ class ScanReport:
     is_without_support: bool = False
     confidence: float | None = None
     grounds: Mapping[str, float] = field(default_factory=dict)
+    rotation_bound_deg: float | None = None
+    translation_bound: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

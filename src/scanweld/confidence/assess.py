@@ -16,6 +16,7 @@ from scanweld.confidence.joint_evidence import JointEvidence, joint_evidence
 from scanweld.confidence.model import Calibration
 from scanweld.confidence.ties import ties_of
 from scanweld.config import Config
+from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 
@@ -36,10 +37,17 @@ class Assessed:
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Confidence:
-    """Of the pose that each pair names (accepted, else its best), and of each placed scan."""
+    """Of the pose that each pair names (accepted, else its best), and of each placed scan.
+
+    Attributes:
+        pairs: Confidence in pairs.
+        scans: Confidence in scans.
+        bounds: How far the pose of a scan may be off, at 95 %, if it is right.
+    """
 
     pairs: Mapping[Edge, Assessed] = field(default_factory=dict)
     scans: Mapping[int, Assessed] = field(default_factory=dict)
+    bounds: Mapping[int, PoseTolerance] = field(default_factory=dict)
 
 
 def assess(

@@ -12,6 +12,7 @@ from scanweld.evidence.visibility import two_way_evidence
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
+from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.graph.reasons import why_open
@@ -51,7 +52,8 @@ def conclude(
     }
     for k, scan in enumerate(prepared):
         report = _scan_report(k, scene, graph)
-        scans[scan.name] = _with_confidence(report, confidence.scans.get(k))
+        report = _with_confidence(report, confidence.scans.get(k))
+        scans[scan.name] = _with_bound(report, confidence.bounds.get(k))
     verdict, reasons = _verdict(graph, scans, mesh, facts, config)
     return Reconstruction(
         poses=_poses(prepared, graph),
@@ -86,6 +88,12 @@ def _with_confidence(report: Report, assessed: Assessed | None) -> Report:
     if assessed is None:
         return report
     return replace(report, confidence=assessed.confidence, grounds=assessed.grounds)
+
+
+def _with_bound(report: ScanReport, bound: PoseTolerance | None) -> ScanReport:
+    if bound is None:
+        return report
+    return replace(report, rotation_bound_deg=bound.angle_deg, translation_bound=bound.shift)
 
 
 def _others(poses: Mapping[int, Pose], reference: int) -> list[int]:

@@ -4,7 +4,7 @@ import logging
 from dataclasses import replace
 
 from scanweld.confidence.assess import Confidence, assess
-from scanweld.confidence.diagnostics import diagnostics_of
+from scanweld.confidence.diagnostics import PairDiagnostics, diagnostics_of
 from scanweld.confidence.model import stored_calibration
 from scanweld.config import Config
 from scanweld.errors import InputError
@@ -12,6 +12,7 @@ from scanweld.evidence.field import make_field
 from scanweld.evidence.judge import Judge
 from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.assemble import build_view_graph
 from scanweld.graph.reasons import doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
@@ -25,6 +26,7 @@ from scanweld.pipeline.problem import graph_problem
 from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
 from scanweld.refinement.scale import ScaleEstimate, estimate_scales
+from scanweld.sensor.accuracy import pose_bounds
 from scanweld.sensor.standing import standing_scans
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
@@ -139,6 +141,8 @@ def assess_placed(
     with stages.stage("confidence") as counts:
         diagnostics = diagnostics_of(scene.intake.prepared, scene.judge, config.contours)
         confidence = assess(graph, diagnostics, stored_calibration(), config)
+        bounds = _bounds(scene, graph, diagnostics)
+        confidence = replace(confidence, bounds=bounds)
         doubts = dict(graph.doubts)
         for k, found in confidence.scans.items():
             if found.confidence < config.confidence.min_good:
@@ -148,6 +152,26 @@ def assess_placed(
         graph = replace(graph, doubts={**doubts, **doubt_alone(graph)})
         counts["doubtful"] = len(graph.doubts)
     return graph, confidence
+
+
+def _bounds(
+    scene: Scene, graph: ViewGraph, diagnostics: PairDiagnostics
+) -> dict[int, PoseTolerance]:
+    """How far the pose of each placed scan may be off."""
+    if scene.sensor is None:
+        return {}
+    sources = dict(enumerate(diagnostics.sources))
+    return {
+        k: bound
+        for component in graph.components
+        for k, bound in pose_bounds(
+            sources,
+            component.poses,
+            graph.compared(component),
+            scene.sensor,
+            scene.judge.diameter,
+        ).items()
+    }
 
 
 def check_knowledge(

@@ -1,0 +1,126 @@
+"""How exact the poses of a component are: 95 % bounds from information and the sensor's errors.
+
+A sensor's noise averages out over a surface, its bent depth does not: neighbouring points are off
+together. So the points of a patch tell no more than the patch: its mean has the correlated error,
+and what is left of the noise. The information of all patches of all pairs (J^T J over the variance)
+makes the covariance of all poses at once, beside the component as a whole.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import jacobian, lever_arm
+from scanweld.geometry.matches import Matches
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.refinement.refine import match_surfaces
+from scanweld.refinement.surface_terms import SurfaceSource
+from scanweld.sensor.learn import PATCH_DIAMETERS
+from scanweld.sensor.model import SensorModel
+
+MATCH_SIGMAS = 3.0
+"""Farthest match, in standard deviations of the distance between surfaces."""
+BOUND_SIGMAS = 2.0
+"""Bounds in standard deviations."""
+FULL_TURN_DEG, DIAMETERS = 180.0, 1.0
+"""Bounds of what nothing determines: it may be anywhere."""
+
+
+def pose_bounds(
+    sources: Mapping[int, SurfaceSource],
+    world_from_sensor: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
+    sensor: SensorModel,
+    diameter: float,
+) -> dict[int, PoseTolerance]:
+    """Bounds of the error of each pose of a component that hold for 95 % of the scans.
+
+    Errors are meant beside the component as a whole: its own place is not known, nor needed.
+
+    Args:
+        sources: Surfaces of the scans, by index.
+        world_from_sensor: Poses of the component's scans.
+        pairs: Scans that are compared, (i, j) in any order.
+        sensor: What is known of the sensor.
+        diameter: Of the run, in the scans' unit.
+    """
+    order = sorted(world_from_sensor)
+    radius = max(MATCH_SIGMAS * sensor.sigma, 0.006 * diameter)
+    found = match_surfaces(sources, world_from_sensor, pairs, radius)
+    middles = {k: world_from_sensor[k].apply(sources[k].points.mean(axis=0)) for k in order}
+    covariance = _covariance(found, order, world_from_sensor, middles, sensor, diameter)
+    arm = lever_arm(diameter)
+    bounds = {}
+    for n, k in enumerate(order):
+        block = covariance[6 * n : 6 * n + 6, 6 * n : 6 * n + 6]
+        turn = float(np.sqrt(np.trace(block[:3, :3]))) / arm
+        shift = float(np.sqrt(np.trace(block[3:, 3:])))
+        bounds[k] = PoseTolerance(
+            angle_deg=min(BOUND_SIGMAS * float(np.degrees(turn)), FULL_TURN_DEG),
+            shift=min(BOUND_SIGMAS * shift, DIAMETERS * diameter),
+        )
+    return bounds
+
+
+def _covariance(
+    found: Sequence[tuple[int, int, Matches]],
+    order: Sequence[int],
+    poses: Mapping[int, Pose],
+    middles: Mapping[int, FloatArray],
+    sensor: SensorModel,
+    diameter: float,
+) -> FloatArray:
+    """(6 N, 6 N) of twists, each about the middle of its scan, the mean of all being none."""
+    place = {k: slice(6 * n, 6 * n + 6) for n, k in enumerate(order)}
+    size, arm = 6 * len(order), lever_arm(diameter)
+    normal = np.zeros((size, size))
+    for i, j, matches in found:
+        points = poses[j].apply(matches.points)
+        directions = poses[j].turn(matches.directions)
+        weights = _weights(points, sensor, PATCH_DIAMETERS * diameter)[:, None]
+        by_i = jacobian(points, directions, middles[i], arm)
+        by_j = -jacobian(points, directions, middles[j], arm)
+        a, b = place[i], place[j]
+        normal[a, a] += (weights * by_i).T @ by_i
+        normal[b, b] += (weights * by_j).T @ by_j
+        cross = (weights * by_i).T @ by_j
+        normal[a, b] += cross
+        normal[b, a] += cross.T
+    free = _without_common_motion(order, middles, arm)
+    inner = free.T @ normal @ free
+    # What nothing holds may be off by a diameter.
+    inner += np.eye(len(inner)) / diameter**2
+    return free @ np.linalg.inv(inner) @ free.T
+
+
+def _weights(points: FloatArray, sensor: SensorModel, patch: float) -> FloatArray:
+    """One over the variance (N,) of matches; those of a patch together weigh as the patch does.
+
+    Matches come from both sides of a pair and say the same twice: each counts half.
+    """
+    cells = np.floor(points / patch).astype(np.int64)
+    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    shared = count[cell.ravel()] * sensor.correlated**2
+    return 0.5 / np.maximum(sensor.white**2 + shared, np.finfo(float).tiny)
+
+
+def _without_common_motion(
+    order: Sequence[int], middles: Mapping[int, FloatArray], arm: float
+) -> FloatArray:
+    """Orthonormal basis (6 N, 6 N - 6) of twists that do not move the component as a whole."""
+    common = np.zeros((6 * len(order), 6))
+    centre = np.mean([middles[k] for k in order], axis=0)
+    for n, k in enumerate(order):
+        common[6 * n : 6 * n + 3, :3] = np.eye(3)
+        common[6 * n + 3 : 6 * n + 6, :3] = -_cross(middles[k] - centre) / arm
+        common[6 * n + 3 : 6 * n + 6, 3:] = np.eye(3)
+    basis, _, _ = np.linalg.svd(common, full_matrices=True)
+    return basis[:, 6:]
+
+
+def _cross(vector: FloatArray) -> FloatArray:
+    """The matrix (3, 3) of a cross product from the left."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
