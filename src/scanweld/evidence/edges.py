@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
-from scanweld.evidence.sample_patches import violating_patches
+from scanweld.evidence.sample_patches import violating_patches, with_patches
 from scanweld.evidence.visibility import mean_evidence, two_way_evidence
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose
@@ -67,7 +67,7 @@ def evidence_off_edges(
     forgiven = strict.front - off_edges.front
     (patches,) = violating_patches(i[1], j[1], [i_from_j], tolerance)
     unknown = strict.unknown + forgiven
-    return replace(strict, front=off_edges.front, unknown=unknown, patches=patches)
+    return with_patches(replace(strict, front=off_edges.front, unknown=unknown), patches)
 
 
 def _footprint(field: ScanField, depth: float) -> float:

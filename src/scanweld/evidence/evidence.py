@@ -9,9 +9,12 @@ CONTRADICT_WEIGHT = 1.5
 FREE_WEIGHT, GRAZING_WEIGHT = 1.0, 0.2
 """Samples in free space say less; next to nothing where their surface is turned away from the
 sensor that looked past them, which may have lost it."""
+FRONT_PATCH_WEIGHT = 2.0
+"""A patch before a surface counts so many times one in free space: surfaces are seen, silhouettes
+are inferred."""
 MAX_EXCESS = 0.03
-"""Share of the samples by which violating patches of a pair, whose place other pairs say, may
-exceed what its set excuses: patches of right pairs that hardly meet come to 0.04."""
+"""Share of the samples by which patches before surfaces of a pair, whose place other pairs say, may
+exceed what its set excuses."""
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
 
@@ -31,8 +34,9 @@ class Evidence:
         grazing: There too, but turned so far away that it might have missed them.
         occluded: Behind the surface that the other sensor saw.
         unknown: On pixels that say nothing.
-        patches: Largest patch of samples that hang together before a surface, doubled, and in free
-            space (``violating_patches``); 0 where that was not asked.
+        front_patch: Largest patch of samples that hang together before a surface
+            (``violating_patches``); 0 where that was not asked.
+        free_patch: The same in free space.
     """
 
     agree: float
@@ -42,7 +46,8 @@ class Evidence:
     occluded: float
     unknown: float
     grazing: float = 0.0
-    patches: float = 0.0
+    front_patch: float = 0.0
+    free_patch: float = 0.0
 
     @property
     def score(self) -> float:
@@ -58,11 +63,15 @@ class Evidence:
     @property
     def contradiction(self) -> float:
         """Patches that violate, as a share of what agrees."""
-        return self.patches / max(self.agree, MIN_AGREE)
+        patches = FRONT_PATCH_WEIGHT * self.front_patch + self.free_patch
+        return patches / max(self.agree, MIN_AGREE)
 
     def excess(self, max_contradiction: float) -> float:
-        """Share of the samples by which violating patches exceed what a set excuses."""
-        return self.patches - max_contradiction * self.agree
+        """Share of the samples by which patches before surfaces exceed what a set excuses.
+
+        Of silhouettes even right pairs that hardly meet show patches: there they say nothing.
+        """
+        return FRONT_PATCH_WEIGHT * self.front_patch - max_contradiction * self.agree
 
     @property
     def surface_violation(self) -> float:

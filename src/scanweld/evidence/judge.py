@@ -1,7 +1,7 @@
 """The judge of a run: what the sensors say of any pair of its scans at any pose."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -10,7 +10,7 @@ from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.patches import PixelConsensus, pixel_consensus
 from scanweld.evidence.pixels import see
-from scanweld.evidence.sample_patches import violating_patches
+from scanweld.evidence.sample_patches import violating_patches, with_patches
 from scanweld.evidence.visibility import evidence_at_poses, mean_evidence
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
@@ -87,7 +87,7 @@ class Judge:
         )
         patches = violating_patches(self.fields[i], self.fields[j], i_from_j, self.tolerance)
         return [
-            replace(mean_evidence(*directions), patches=patch)
+            with_patches(mean_evidence(*directions), patch)
             for directions, patch in zip(both, patches, strict=True)
         ]
 

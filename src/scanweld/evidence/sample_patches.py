@@ -6,25 +6,22 @@ become smaller. So a pose is judged by its largest patch, not by the sum of all 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.compiled.kernels import njit
+from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
 from scanweld.evidence.visibility import FREE, FRONT, IS_SURFACE, ask_forward, pose_rows
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 
-FRONT_PATCH_WEIGHT = 2.0
-"""A patch before a surface counts so many times one in free space: surfaces are seen, silhouettes
-are inferred."""
-
-
 def violating_patches(
     i: ScanField, j: ScanField, i_from_j: Sequence[Pose], tolerance: float
-) -> list[float]:
-    """Largest patch before a surface, doubled, and largest patch in free space, at each pose.
+) -> FloatArray:
+    """Largest patch before a surface, and largest patch in free space, at each pose: (P, 2).
 
     They are shares of the samples of a scan; the mean of both directions is taken.
 
@@ -34,17 +31,23 @@ def violating_patches(
         i_from_j: The poses, between the sensor frames.
         tolerance: Of the distance from the surface, in the scans' unit.
     """
-    forward = _weighed(j, i, pose_rows(i_from_j), tolerance)
-    backward = _weighed(i, j, pose_rows([pose.inverse() for pose in i_from_j]), tolerance)
-    return (0.5 * (forward + backward)).tolist()
+    forward = _shares(j, i, pose_rows(i_from_j), tolerance)
+    backward = _shares(i, j, pose_rows([pose.inverse() for pose in i_from_j]), tolerance)
+    return 0.5 * (forward + backward)
 
 
-def _weighed(here: ScanField, there: ScanField, rows: FloatArray, tolerance: float) -> FloatArray:
-    """The patches (P,) of one scan's samples for the other's sensor; rows are there_from_here."""
+def with_patches(evidence: Evidence, patches: FloatArray) -> Evidence:
+    """Evidence with the two patches (2,) of its pose."""
+    front, free = patches.tolist()
+    return replace(evidence, front_patch=front, free_patch=free)
+
+
+def _shares(here: ScanField, there: ScanField, rows: FloatArray, tolerance: float) -> FloatArray:
+    """The patches (P, 2) of one scan's samples for the other's sensor; rows are there_from_here."""
     sizes = _largest_patches(
         there.camera, there.raster, here.points, here.normals, here.neighbours, rows, tolerance
     )
-    return (FRONT_PATCH_WEIGHT * sizes[:, 0] + sizes[:, 1]) / max(len(here.points), 1)
+    return sizes / max(len(here.points), 1)
 
 
 @njit(cache=True, nogil=True)

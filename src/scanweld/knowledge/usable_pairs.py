@@ -46,8 +46,9 @@ class LenientVerdict:
         i, j = (self.fields[k] for k in edge)
         problem = PairProblem(edge=edge, i=i, j=j, config=lenient)
         result = result_of(problem, alternatives)
-        patches = 0.0 if result.best is None else result.best.evidence.patches
-        return held_to(result, self.max_contradiction, patches)
+        if result.best is None:
+            return result
+        return held_to(result, self.max_contradiction, result.best.evidence)
 
 
 def usable_pairs(

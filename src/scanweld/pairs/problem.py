@@ -1,7 +1,7 @@
 """Two scans whose relative pose is asked for, and what can be asked of a pose of theirs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from scanweld.config import PairsConfig
 from scanweld.evidence.field import ScanField
@@ -9,7 +9,7 @@ from scanweld.evidence.icp import IcpSchedule, icp
 from scanweld.evidence.information import TwoWayMatches, two_way_matches
 from scanweld.evidence.pixels import TwoWay, see
 from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
-from scanweld.evidence.sample_patches import violating_patches
+from scanweld.evidence.sample_patches import violating_patches, with_patches
 from scanweld.evidence.visibility import mean_evidence, pose_rows, two_way_evidence
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.pose import Pose, nearest_rotation
@@ -61,8 +61,7 @@ class PairProblem:
         """A pose between the sensor frames with its evidence, by all samples."""
         evidence = mean_evidence(*two_way_evidence(self.i, self.j, i_from_j, self.tolerance))
         (patches,) = violating_patches(self.i, self.j, [i_from_j], self.tolerance)
-        evidence = replace(evidence, patches=patches)
-        return Alternative(i_from_j=i_from_j, evidence=evidence)
+        return Alternative(i_from_j=i_from_j, evidence=with_patches(evidence, patches))
 
     def refine(self, poses: Sequence[Pose]) -> list[Alternative]:
         """Poses i_from_j after a close ICP, each with its evidence, in the order given."""

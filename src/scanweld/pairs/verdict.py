@@ -124,18 +124,16 @@ def classify_pair(
     )
 
 
-def held_to(result: PairResult, max_contradiction: float, patches: float) -> PairResult:
+def held_to(result: PairResult, max_contradiction: float, evidence: Evidence) -> PairResult:
     """A pair by what its set lets violating patches come to, once that is known.
 
     Args:
         result: The pair.
         max_contradiction: Largest patches over what agrees.
-        patches: Largest patches of its best pose, at the tolerance of the set.
+        evidence: That on its best pose, at the tolerance of the set.
     """
-    best = result.best
-    if best is None or result.kind in (PairKind.CONTRADICTED, PairKind.NO_OVERLAP):
+    if result.kind in (PairKind.CONTRADICTED, PairKind.NO_OVERLAP):
         return result
-    evidence = replace(best.evidence, patches=patches)
     if evidence.contradiction <= max_contradiction:
         return result
     return replace(
@@ -169,7 +167,8 @@ def not_compared(i: int, j: int, reason: str) -> PairResult:
 
 
 def _contradicted(evidence: Evidence) -> str:
-    told = f"patches of {evidence.patches:.2f} violated, {evidence.agree:.2f} agreed"
+    front, free = evidence.front_patch, evidence.free_patch
+    told = f"patches of {front + free:.2f} violated, {evidence.agree:.2f} agreed"
     return f"each sensor saw through the other's surface: {told}"
 
 

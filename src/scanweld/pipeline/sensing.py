@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from scanweld.config import Config
-from scanweld.evidence.sample_patches import violating_patches
+from scanweld.evidence.sample_patches import violating_patches, with_patches
 from scanweld.graph.view_graph import Edge
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import held_to
@@ -47,13 +47,12 @@ def _held(
     """The pairs, those whose violations hang together more than right ones' do contradicted."""
     judge, held = scene.judge, {}
     for (i, j), pair in pairs.items():
-        patches = 0.0
         if pair.best is not None:
-            patches = pair.best.evidence.patches
+            best, evidence = pair.best, pair.best.evidence
             if sensor.tolerance > judge.tolerance:
-                pose = pair.best.i_from_j
-                (patches,) = violating_patches(
-                    judge.fields[i], judge.fields[j], [pose], sensor.tolerance
-                )
-        held[i, j] = held_to(pair, sensor.max_contradiction, patches)
+                both = judge.fields[i], judge.fields[j]
+                (patches,) = violating_patches(*both, [best.i_from_j], sensor.tolerance)
+                evidence = with_patches(evidence, patches)
+            pair = held_to(pair, sensor.max_contradiction, evidence)
+        held[i, j] = pair
     return held
