@@ -35,7 +35,12 @@ class PreparedPair:
     def judge(self) -> Judge:
         """The two scans as later stages ask them."""
         tolerance = PairsConfig().fine_tolerance_diameters * self.diameter
-        return Judge(fields=self.fields, diameter=self.diameter, tolerance=tolerance)
+        return Judge(
+            fields=self.fields,
+            diameter=self.diameter,
+            tolerance=tolerance,
+            max_contradiction=PairsConfig().max_contradiction,
+        )
 
     def off_by(self, i_from_j: Pose) -> tuple[float, float]:
         """Error of a pose: degrees, and shift of j's centre in diameters."""

@@ -92,9 +92,10 @@ def test_a_scan_beside_the_other_lies_in_free_space(model: CameraModel):
     aside, near = (Pose.exp([0, 0, 0, by * pair.diameter, 0, 0]) for by in (3.0, 0.15))
     _, of_j = evidence_at(pair, aside @ pair.i_from_j)
     # Beyond the image its border speaks, which the narrow field of view leaves partly unknown.
-    assert of_j.free + of_j.unknown == pytest.approx(1.0)
+    assert of_j.free + of_j.grazing + of_j.unknown == pytest.approx(1.0)
     _, of_j = evidence_at(pair, near @ pair.i_from_j)
-    assert of_j.free > 0.2
+    assert of_j.free > 0.2, "it faces the other sensor, which would have seen it"
+    assert of_j.grazing > 0.05
 
 
 def test_flipped_normals_contradict():
@@ -145,8 +146,10 @@ def test_the_mean_of_both_directions():
 
 
 def evidence(agree: float, front: float = 0.0, free: float = 0.0) -> Evidence:
+    """All that violates hangs together."""
     left = 1.0 - agree - front - free
-    return Evidence(agree=agree, front=front, contradict=0.0, free=free, occluded=left, unknown=0.0)
+    told = Evidence(agree=agree, front=front, contradict=0.0, free=free, occluded=left, unknown=0.0)
+    return replace(told, front_patch=front, free_patch=free)
 
 
 def options_of(evidences: list[Evidence]) -> list[Alternative]:
@@ -196,8 +199,10 @@ def test_one_more_rival_never_makes_a_pose_surer(a: float, b: float, front: floa
 
 
 def test_how_clearly_rivals_are_refuted_is_told_by_the_least_contradicted_one():
-    best, poor, poorer = evidence(0.6), evidence(0.2, front=0.1), evidence(0.3, front=0.3)
+    best, poor, poorer = evidence(0.6), evidence(0.2, front=0.05), evidence(0.3, front=0.3)
     assert refuted(best, [poor, poorer]) == pytest.approx(0.5)
+    scattered = replace(poor, front_patch=0.005)
+    assert refuted(best, [scattered]) == pytest.approx(0.05), "what does not hang together is noise"
     assert refuted(best, [poorer]) == 1.0
     assert refuted(best, [poorer, evidence(0.3)]) == 0.0
     assert refuted(best, [evidence(0.08)]) == 1.0, "a sliver is no rival"

@@ -106,7 +106,9 @@ def test_what_is_no_edge_is_not_forgiven():
 def drifting(at_truth: Evidence) -> Say:
     """Three scans in a row; what 0 and 2 say of each other where 1-2 is 4 deg off, and at truth."""
     world = world_of(3)
-    denied = Evidence(agree=0.3, front=0.14, contradict=0, free=0, occluded=0.5, unknown=0.06)
+    denied = Evidence(
+        agree=0.3, front=0.14, contradict=0, free=0, occluded=0.5, unknown=0.06, front_patch=0.1
+    )
 
     def judge_pair(i: int, j: int, i_from_j: Pose) -> Evidence:
         if i > j:

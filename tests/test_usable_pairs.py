@@ -148,6 +148,7 @@ class AsUsual(LenientVerdict):
     pairs: Pairs
     fields: Sequence[ScanField] = ()
     config: PairsConfig = field(default_factory=PairsConfig)
+    max_contradiction: float = 0.1
 
     def classify(self, edge: Edge, alternatives: object) -> PairResult:
         return self.pairs[edge]

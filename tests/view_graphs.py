@@ -20,7 +20,9 @@ from scanweld.pairs.result import Alternative, PairKind, PairResult
 CENTRE = np.array([0.0, 0.0, 3.0])
 SAME_DEG, SAME_SHIFT = 2.5, 0.03
 GOOD, WEAK = 0.4, 0.09
-DENIED = Evidence(agree=0.1, front=0.2, contradict=0.0, free=0.1, occluded=0.5, unknown=0.1)
+DENIED = Evidence(
+    agree=0.1, front=0.2, contradict=0.0, free=0.1, occluded=0.5, unknown=0.1, front_patch=0.1
+)
 Pairs = dict[Edge, PairResult]
 Say = Callable[[int, int, Pose], Evidence]
 SAME = PoseTolerance(angle_deg=5.0, shift=0.03)
@@ -39,6 +41,7 @@ class DrawnJudge:
     says: Say
     says_off_edges: Say | None = None
     sees: Callable[[Poses, Poses], list[PixelConsensus]] = nothing_seen
+    max_contradiction: float = 0.1
 
     def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
         return self.says(i, j, i_from_j)

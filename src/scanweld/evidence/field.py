@@ -1,6 +1,6 @@
 """A scan laid out for the compiled kernels: what its sensor saw, and its closest points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,11 @@ class ScanField:
         raster: (H, W, 6) float32 depth, normal, outside, kind of each pixel.
         points: (N, 3) evenly spread samples, any prefix of which is evenly spread too.
         normals: (N, 3) their normals.
-        neighbours: (N, 6) int32 index of the samples nearest to each.
         centre: (3,) mean of the samples.
         surface: (M, 7) points, normals and a flag that is 1 off the rim: targets of matching.
         closest: (A, B, C) int32 index into surface of the point nearest to each voxel.
         origin: (4,) centre of voxel (0, 0, 0), and the voxels' edge.
+        neighbours: (N, 6) int32 index of the samples nearest to each.
     """
 
     diameter: float
@@ -44,11 +44,14 @@ class ScanField:
     raster: NDArray[np.float32]
     points: FloatArray
     normals: FloatArray
-    neighbours: NDArray[np.int32]
     centre: FloatArray
     surface: FloatArray
     closest: NDArray[np.int32]
     origin: FloatArray
+    neighbours: NDArray[np.int32] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "neighbours", _neighbours(self.points))
 
 
 def make_field(scan: PreparedScan) -> ScanField:
@@ -62,7 +65,6 @@ def make_field(scan: PreparedScan) -> ScanField:
         raster=_raster(scan.image),
         points=np.array(samples.points),
         normals=np.array(samples.normals),
-        neighbours=_neighbours(samples.points),
         centre=samples.points.mean(axis=0),
         surface=surface,
         closest=closest,

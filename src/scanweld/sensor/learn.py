@@ -10,10 +10,11 @@ import numpy as np
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.information import two_way_matches
 from scanweld.geometry.arrays import FloatArray
-from scanweld.graph.view_graph import Edge
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.model import SensorModel
+
+Edge = tuple[int, int]
 
 CERTAIN_AGREE, CERTAIN_VIOLATED = 0.25, 0.15
 """A certain pair agrees on so much; of that, so little lies before a surface or contradicts it."""
