@@ -64,12 +64,11 @@ def test_what_a_feature_decides_against_is_told():
     pair = gear_of(worn)
     found = registered(pair)
     assert pair.off_by(found.alternatives[0].i_from_j)[0] < 1.0
-    tied = 0.7 * found.alternatives[0].score
-    off = [pair.off_by(o.i_from_j)[0] for o in found.passed_over if o.score >= tied]
+    off = [pair.off_by(option.i_from_j)[0] for option in found.passed_over]
     assert min(off) > 12.0
     # Rivals are kept as the search refined them, and what refines them has no exact answer: a turn
     # that fits badly settles within a few degrees. Neighbouring teeth are 45 degrees apart.
-    assert all(min(abs(angle - turn) for angle in off) < 5.0 for turn in (45, 90, 135, 180))
+    assert all(min(abs(angle - turn) for angle in off) < 8.0 for turn in (45, 90, 135, 180))
     assert not registered(gear_of(gear)).passed_over
 
 
