@@ -213,6 +213,8 @@ def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.Mo
     units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
     seeds = (FIRST_FRESH, FIRST_FRESH + 1)
     assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]
+    thrice = Runs(scenarios=(CLEAN, "hand"), seeds=30, times=3).units(False)
+    assert len(thrice) == 3 * SCENARIOS["hand"].seeds + 30 < 3 * (SCENARIOS[CLEAN].seeds + 8)
     assert len(Runs().units(False)) == sum(scenario.seeds for scenario in SCENARIOS.values()) >= 300
 
 
