@@ -155,6 +155,7 @@ SCENARIOS: Mapping[str, Scenario] = {
     "ring of 4": _reported(seeds=4, views=partial(ring, count=4), min_overlap=0.0),
     "8 from anywhere": _reported(seeds=4, views=partial(on_sphere, count=8), min_overlap=0.0),
     "64 pixels across": _reported(seeds=4, views=partial(SIX, pixels=(64.0,))),
+    "hand in every scan": _reported(taking=partial(held_by_hand, num_held=6)),
     "table, turned over": _reported(views=TURNED, taking=on_table_turned_over),
     "bare points": _reported(disturbances=(POINTS,)),
     "meshes": _reported(disturbances=(each(harm.as_mesh),)),
