@@ -1,6 +1,7 @@
 """Try to make the main job assert what is not so: hard conditions by seeds, and what it says.
 
     python -m benchmarks.trust                            all runs and the page docs/trust.md
+    python -m benchmarks.trust --times 3                  three times as many: narrower bounds
     python -m benchmarks.trust --compare                  other tools on some of the pairs, too
     python -m benchmarks.trust --only "ring of 6" hand --seeds 2 --out DIR
     python -m benchmarks.trust --quick --out DIR          a handful of runs
@@ -46,13 +47,15 @@ def main() -> int:
     add = parser.add_argument
     add("--only", nargs="+", choices=SCENARIOS, default=tuple(SCENARIOS), metavar="NAME")
     add("--seeds", type=int, default=10**6, help="of each scenario, at most (default: its own)")
+    add("--times", type=int, default=1, metavar="N", help="N times as many runs of each scenario")
     add("--first-seed", type=int, default=FIRST_FRESH, help="see benchmarks/SEEDS.md")
     add("--compare", action="store_true", help="other tools on some pairs too (extra: bench)")
     add("--pages", action="store_true", help="only write the page anew")
     options = add_options(parser, "--jobs", "trust").parse_args()
     warn_of_old_calibration()
     if not options.pages:
-        runs = Runs(scenarios=options.only, seeds=options.seeds, first_seed=options.first_seed)
+        counted = {"seeds": options.seeds, "first_seed": options.first_seed, "times": options.times}
+        runs = Runs(scenarios=options.only, **counted)
         refuse_seen_seeds(runs.units(options.quick), options.out)
         measured(runs, study(options, "trust", TRUSTED), is_written=True)
         if options.compare:

@@ -8,18 +8,23 @@ import numpy as np
 
 from benchmarks.calibration.solids import SOLIDS
 from benchmarks.virtual import disturbances as harm
+from benchmarks.virtual import sensors, trims
 from benchmarks.virtual.bodies import Body, Rng
-from benchmarks.virtual.disturbances import Disturbance, each
-from benchmarks.virtual.scene import HIDDEN_PIXELS, Scene, posed, with_mark_seen
+from benchmarks.virtual.disturbances import Disturbance, alike, each, in_turn
+from benchmarks.virtual.rooms import in_standing_room, turned_before_sensor
+from benchmarks.virtual.scene import BASIN, HIDDEN_PIXELS, Scene, posed, with_mark_seen
 from benchmarks.virtual.scenery import held_by_hand, on_table, on_turntable
 from benchmarks.virtual.shots import Shot, take_shots
+from scanweld.evaluation.metrics import RIGHT
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import View, view_of
 from scanweld.geometry.scan import principal_diameter
 
-HARM, SCENERY, STRANGERS = 0.45, 0.15, 0.2
-"""Share of the sets in which something goes wrong besides noise and dropouts, in which something
-else is scanned too, and that hold scans of another object of the same family."""
+STEREO, HARM, SCENERY, STRANGERS = 0.2, 0.4, 0.15, 0.2
+"""Share of the sets of a sensor whose errors are correlated, in which something goes wrong besides,
+in which something else is scanned too, and that hold scans of another object of the same family."""
+STANDING = 0.04
+"""Share of the sets in which the object turns before a standing camera that sees the whole room."""
 MAX_SCANS = 6
 MAX_NOISE = 0.01
 OTHER = 500_000
@@ -31,21 +36,31 @@ def make_set(seed: int) -> Scene:
     rng = np.random.default_rng([seed, 11])
     family = str(rng.choice([make.__name__ for make in SOLIDS], p=list(SOLIDS.values())))
     body = _make_solid(family, seed)
+    is_stereo = rng.random() < STEREO
     noise = NoiseModel(
-        depth_diameters=MAX_NOISE * 10 ** rng.uniform(-1.7, 0.0),
+        depth_diameters=MAX_NOISE * 10 ** rng.uniform(-1.7, -0.5 if is_stereo else 0.0),
         dropout=float(rng.choice([0.0, 0.01, 0.1, 0.3])),
         grazing_dropout=rng.uniform(0.3, 0.9),
     )
+    if rng.random() < STANDING:
+        return posed(_in_room(body, noise, seed, rng), body, _diameter(body), seed)
     views = _views(body, rng)
     taking = take_shots
     if rng.random() < SCENERY:
         taking = (on_table, on_turntable, held_by_hand)[int(rng.integers(3))]
     shots = with_mark_seen(taking(body, views, noise, seed), body, views, HIDDEN_PIXELS + 1)
+    if is_stereo:
+        shots = _stereo(rng)(shots, rng)
     if rng.random() < HARM:
         shots = _harm(body, rng)(shots, rng)
     if rng.random() < STRANGERS:
         shots = [*shots, *_strangers(family, noise, seed, rng)][-MAX_SCANS:]
-    return posed(shots, body, principal_diameter(body.mesh.vertices), seed)
+    scene = posed(shots, body, _diameter(body), seed)
+    return replace(scene, limits=BASIN if is_stereo else RIGHT)
+
+
+def _diameter(body: Body) -> float:
+    return principal_diameter(body.mesh.vertices)
 
 
 def _make_solid(family: str, seed: int) -> Body:
@@ -79,6 +94,40 @@ def _strangers(family: str, noise: NoiseModel, seed: int, rng: Rng) -> Sequence[
     return [replace(shot, world=1, world_from_sensor=away @ shot.pose) for shot in shots]
 
 
+def _in_room(body: Body, noise: NoiseModel, seed: int, rng: Rng) -> list[Shot]:
+    """Whole frames of a standing camera, whose waves stand still like all that it sees."""
+    count, pixels = int(rng.integers(3, 6)), (50.0, 130.0)
+    views = turned_before_sensor(body, rng, count=count, pixels=pixels, elevation_deg=(10.0, 60.0))
+    waves = each(
+        sensors.depth_waves,
+        of_depth=0.01 * 10 ** rng.uniform(-1.0, 0.3),
+        length_diameters=rng.uniform(0.04, 0.2),
+    )
+    return alike(waves)(in_standing_room(body, views, noise, seed), rng)
+
+
+def _stereo(rng: Rng) -> Disturbance:
+    """A depth camera of two eyes, which errs by hardly anything or by up to two percent."""
+    rms, length = 0.02 * 10 ** rng.uniform(-1.3, 0.0), rng.uniform(0.1, 0.7)
+    return in_turn(
+        each(sensors.depth_waves, rms_diameters=rms, length_diameters=length),
+        each(sensors.stereo_shadow, baseline_diameters=rng.uniform(0.02, 0.4)),
+        each(sensors.eaten_edges, least=rng.uniform(0.0, 1.0), most=rng.uniform(1.0, 4.0)),
+        each(sensors.quantised, step_diameters=rng.uniform(0.0005, 0.008)),
+    )
+
+
+def _trimmed(rng: Rng) -> Disturbance:
+    """Range maps as people leave them."""
+    cut = (trims.trimmed_along_curve, trims.boxed)[int(rng.integers(2))]
+    holes = {"count": rng.uniform(0.0, 6.0), "radius_diameters": rng.uniform(0.01, 0.08)}
+    return in_turn(
+        each(sensors.without_grazing, max_incidence_deg=rng.uniform(55.0, 85.0)),
+        each(cut, share=rng.uniform(0.6, 1.0)),
+        each(trims.with_holes, **holes),
+    )
+
+
 def _harm(body: Body, rng: Rng) -> Disturbance:
     harms: list[Disturbance] = [
         each(harm.outlier_points, share=rng.uniform(0.02, 0.2)),
@@ -88,7 +137,10 @@ def _harm(body: Body, rng: Rng) -> Disturbance:
         partial(harm.crop_above, share=rng.uniform(0.5, 0.8)),
         each(harm.crop_by_hand, share=rng.uniform(0.6, 0.8)),
         partial(harm.scaled, factor=1.0 + rng.uniform(-0.03, 0.03)),
+        partial(harm.scales, within=rng.uniform(0.005, 0.03)),
+        *(_trimmed(rng), _trimmed(rng)),
         each(harm.as_points),
+        each(harm.as_points_seen),
         each(harm.without_camera),
     ]
     if body.unmarked is None:

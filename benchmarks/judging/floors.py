@@ -60,6 +60,7 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
             if scenario.min_kept is not None
         ),
         _two_bodies([outcome for outcome in outcomes if outcome.group is Group.TWO_BODIES]),
+        _accused([outcome for outcome in outcomes if outcome.group is Group.FILES]),
         _scaled([s for o in outcomes if o.group is Group.SCALE for s in o.scans if s.factor != 1]),
         *_confidence(outcomes),
         _none(
@@ -87,6 +88,11 @@ def names_factor(scan: ScanOutcome) -> bool:
     return "scale" in scan.reason and any(abs(f - t) < FACTOR_SLACK for f in factors for t in true)
 
 
+def is_accused(scan: ScanOutcome) -> bool:
+    """Whether a scan is doubted or left out for its scale."""
+    return not scan.is_good and "scale" in scan.reason
+
+
 def names_bodies(outcome: Outcome) -> bool:
     """Whether a run says that not all of what its scans show moves as one body."""
     return _NAMES_BODIES.search(outcome.reason) is not None
@@ -110,6 +116,14 @@ def _asserted(outcomes: Sequence[Outcome]) -> Floor:
     measure = f"symmetric and sliding objects: pose asserted with confidence > {ASSERTED:g}"
     found = _none(measure, counts, [o for o in outcomes if any(s.is_open for s in o.scans)])
     return found if scans else found._replace(is_met=None)
+
+
+def _accused(outcomes: Sequence[Outcome]) -> Floor:
+    """Scans without an error that somebody would now scale."""
+    scans = judged.scans_of(outcomes)
+    counts = {f"of {len(scans)} in {len(outcomes)} sets": sum(map(is_accused, scans))}
+    floor = _none("files of all sorts: scans accused of a wrong scale", counts, outcomes)
+    return floor if scans else floor._replace(reached=NOT_MEASURED, is_met=None)
 
 
 def _kept(name: str, asked: float, outcomes: Sequence[Outcome]) -> Floor:

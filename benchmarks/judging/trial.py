@@ -39,12 +39,13 @@ class Runs(Kept):
     scenarios: Sequence[str] = tuple(SCENARIOS)  # Names
     seeds: int = 10**6  # How many of each, at most
     first_seed: int = FIRST_FRESH  # The first seed of each
+    times: int = 1  # As many runs as the scenarios ask for
     NAME: str = "trust"
     TITLE: str = "Trust"
 
     def units(self, quick: bool) -> list[Unit]:
         """Scenario by scenario and seed by seed; one of a few if quick."""
-        counts = {name: min(self.seeds, SCENARIOS[name].seeds) for name in self.scenarios}
+        counts = {n: min(self.seeds, self.times * SCENARIOS[n].seeds) for n in self.scenarios}
         return seeded(QUICK if quick else counts, self.first_seed)
 
     def measure(self, unit: Unit) -> Result:

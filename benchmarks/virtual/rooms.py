@@ -25,10 +25,12 @@ it turns by a share of its diameter, at most."""
 TABLE, WALL, WALL_SIZE, WALL_TURN_DEG = (1.5, 2.5), (1.6, 3.5), 8.0, 25.0
 """In diameters, half a table's width, how far behind the object the wall is, and half its width;
 how far the wall is turned from across the line of sight, at most."""
-CLUTTER, CLUTTER_AWAY, CLUTTER_SIZE, CLUTTER_ASIDE_DEG = (2, 6), (1.0, 1.5), (0.1, 0.35), 120.0
+NUM_FOLDS, FOLD, FOLD_LENGTH = 6, (0.1, 0.8), (0.8, 3.0)
+"""Waves that are averaged to the folds of what hangs on the wall, their height and length."""
+CLUTTER, CLUTTER_AWAY, CLUTTER_SIZE, CLUTTER_ASIDE_DEG = (3, 8), (1.0, 1.8), (0.1, 0.4), 120.0
 """Things on the table: how many, how far from the object and how wide in its diameters, and how
 far aside of straight behind it."""
-CELLS = 40
+CELLS = 80
 """Squares along each side of a plane: those beside the camera are left out of its image."""
 LID, LID_SHARE, OPEN_DEG = 0.04, 0.7, (40.0, 100.0)
 """Thickness of a lid in diameters, its share of the object's width and depth, how far it opens."""
@@ -87,7 +89,9 @@ def _room(body: Body, world_from_sensor: Pose, rng: Rng) -> TriangleMesh:
     parts = [shifted(_plane(size * rng.uniform(*TABLE)), ground)]
     turn = np.radians(rng.uniform(-WALL_TURN_DEG, WALL_TURN_DEG))
     wall = _plane(WALL_SIZE * size)
-    upright = wall.vertices[:, [2, 0, 1]] @ _towards(ahead, turn)
+    folds = _folds(wall.vertices[:, :2] / size, rng)
+    flat = np.column_stack([size * folds, wall.vertices[:, :2]])
+    upright = flat @ _towards(ahead, turn)
     behind = ground + size * rng.uniform(*WALL) * ahead
     parts.append(TriangleMesh(vertices=upright + behind, faces=wall.faces))
     for _ in range(int(rng.integers(*CLUTTER, endpoint=True))):
@@ -96,6 +100,17 @@ def _room(body: Body, world_from_sensor: Pose, rng: Rng) -> TriangleMesh:
         place = ground + size * rng.uniform(*CLUTTER_AWAY) * way
         parts.append(shifted(_thing(size, rng), place))
     return _together(parts)
+
+
+def _folds(places: FloatArray, rng: Rng) -> FloatArray:
+    """How far (N,) a curtain stands out at places (N, 2), all in diameters of the object."""
+    turns, lengths = (
+        rng.uniform(0, np.pi, size=NUM_FOLDS),
+        rng.uniform(*FOLD_LENGTH, size=NUM_FOLDS),
+    )
+    across = 2 * np.pi / lengths * np.array([np.cos(turns), np.sin(turns)])
+    waves = np.sin(places @ across + rng.uniform(0, 2 * np.pi, size=NUM_FOLDS))
+    return rng.uniform(*FOLD) * waves.mean(axis=1)
 
 
 def _thing(size: float, rng: Rng) -> TriangleMesh:

@@ -8,7 +8,7 @@ from benchmarks.virtual import disturbances as harm
 from benchmarks.virtual import sensors, trims
 from benchmarks.virtual.disturbances import Disturbance, alike, drawn, each, in_turn, one_of
 from benchmarks.virtual.rooms import in_standing_room, turned_before_sensor, with_lid_opened
-from benchmarks.virtual.scene import Group, Scenario
+from benchmarks.virtual.scene import BASIN, Group, Scenario
 from benchmarks.virtual.scenery import (
     held_by_hand,
     on_table,
@@ -17,7 +17,6 @@ from benchmarks.virtual.scenery import (
     turned_over,
 )
 from benchmarks.virtual.shots import SLIGHT, on_sphere, ring, twice
-from scanweld.evaluation.metrics import Limits
 from scanweld.geometry.camera import CameraModel
 
 SCALE = 1.01
@@ -25,17 +24,15 @@ SCALE = 1.01
 FROM_ABOVE_DEG = (25.0, 40.0)
 """Elevations from which a table is seen, and whatever stands on it."""
 
-BASIN = Limits(rotation_deg=5.0, translation_percent=4.0)
-"""Where a sensor's own error moves the best pose, that of the right basin is right."""
-
 SIX, FIVE, EIGHT = (partial(ring, count=count) for count in (6, 5, 8))
 ARC = partial(SIX, step_deg=25.0)
+SMALL = partial(FIVE, step_deg=45.0, pixels=(110.0,))
 ABOVE = partial(SIX, elevations_deg=FROM_ABOVE_DEG)
 TURNED = partial(turned_over, half=partial(FIVE, elevations_deg=FROM_ABOVE_DEG))
 TURNTABLE = partial(turned_before_sensor, count=6)
 BALL = partial(harm.crop_to_ball, radius_diameters=0.25)
 GRIDS = each(harm.without_camera)
-POINTS = each(harm.as_points)
+POINTS, SEEN = each(harm.as_points), each(harm.as_points_seen)
 OTHERS = partial(harm.half_of, views=SIX)
 
 TRIMMED = in_turn(
@@ -46,7 +43,7 @@ TRIMMED = in_turn(
     drawn(trims.with_holes, count=(0.0, 4.0), radius_diameters=(0.02, 0.06)),
 )
 """Range maps as people leave them."""
-NO_GRID = one_of(POINTS, each(harm.as_points_seen))
+NO_GRID = one_of(POINTS, SEEN)
 
 
 def stereo(rms: harm.Range, length: harm.Range) -> tuple[Disturbance, ...]:
@@ -75,6 +72,8 @@ _crop = partial(_hard, group=Group.CROP, seeds=6)
 _symmetric = partial(_hard, group=Group.SYMMETRIC, seeds=5, views=FIVE, min_overlap=0.0)
 """Solids of which no pose of a scan is the only one."""
 _reported = partial(_hard, group=Group.REPORTED, seeds=5)
+_files = partial(_hard, group=Group.FILES, seeds=25, views=SMALL)
+"""Clean scans in files of all sorts, which nobody must accuse of a wrong scale."""
 _sensor = partial(_hard, group=Group.SENSOR)
 """What real sensors do, and files that say less, with settings drawn from ranges."""
 _two_bodies = partial(_hard, group=Group.TWO_BODIES, taking=in_standing_room)
@@ -96,6 +95,11 @@ SCENARIOS: Mapping[str, Scenario] = {
     "resolutions 1:4": _hard(views=partial(SIX, pixels=(80.0, 320.0))),
     "scale error 1 %": _hard(
         group=Group.SCALE, disturbances=(partial(harm.scaled, factor=SCALE),), spoils_first=True
+    ),
+    "scale error 1 %, points and viewpoint": _hard(
+        group=Group.SCALE,
+        disturbances=(partial(harm.scaled, factor=SCALE), SEEN),
+        spoils_first=True,
     ),
     # Background that is not free
     "crop to a ball": _crop(views=ARC, crop=BALL),
@@ -123,6 +127,11 @@ SCENARIOS: Mapping[str, Scenario] = {
     "gear with a worn tooth": _hard(
         seeds=6, body="marked gear", views=partial(SIX, elevations_deg=(35.0, 20.0))
     ),
+    # Files
+    "file: range image": _files(),
+    "file: bare points": _files(disturbances=(POINTS,)),
+    "file: points and viewpoint": _files(disturbances=(SEEN,)),
+    "file: mesh": _files(disturbances=(each(harm.as_mesh),)),
     # Real sensors
     "trimmed maps": _sensor(views=EIGHT, crop=TRIMMED, min_kept=0.95),
     "no grid": _sensor(disturbances=(NO_GRID,), min_kept=0.97),
@@ -134,7 +143,7 @@ SCENARIOS: Mapping[str, Scenario] = {
     ),
     "scale +-2 %": _sensor(disturbances=(partial(harm.scales, within=0.02),), limits=BASIN),
     # Not all that is seen moves as one body
-    "standing background": _two_bodies(views=TURNTABLE, disturbances=WHOLE_FRAMES),
+    "standing background": _two_bodies(seeds=20, views=TURNTABLE, disturbances=WHOLE_FRAMES),
     "lid opened": _two_bodies(views=EIGHT, taking=with_lid_opened),
     # Symmetric
     **{name: _symmetric(body=name) for name in ("sphere", "cylinder", "cone", "box", "plate")},
@@ -146,6 +155,7 @@ SCENARIOS: Mapping[str, Scenario] = {
     "ring of 4": _reported(seeds=4, views=partial(ring, count=4), min_overlap=0.0),
     "8 from anywhere": _reported(seeds=4, views=partial(on_sphere, count=8), min_overlap=0.0),
     "64 pixels across": _reported(seeds=4, views=partial(SIX, pixels=(64.0,))),
+    "hand in every scan": _reported(taking=partial(held_by_hand, num_held=6)),
     "table, turned over": _reported(views=TURNED, taking=on_table_turned_over),
     "bare points": _reported(disturbances=(POINTS,)),
     "meshes": _reported(disturbances=(each(harm.as_mesh),)),

@@ -19,6 +19,8 @@ from scanweld.geometry.scan import RangeScan, principal_diameter
 
 CHAIN_OVERLAP = 0.2
 """Pairs of neighbours overlap by at least this share."""
+BASIN = Limits(rotation_deg=5.0, translation_percent=4.0)
+"""Where a sensor's own error moves the best pose, that of the right basin is right."""
 MAX_DRAWS = 60
 MARK_PIXELS, HIDDEN_PIXELS = 25, 3
 """A scan that shows a mark shows so many pixels of it, another one next to none."""
@@ -34,6 +36,7 @@ class Group(StrEnum):
     CROP = "crop"
     SCALE = "scale"
     SYMMETRIC = "symmetric"
+    FILES = "files"
     SENSOR = "sensor"
     TWO_BODIES = "two bodies"
     REPORTED = "reported"

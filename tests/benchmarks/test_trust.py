@@ -19,8 +19,8 @@ from benchmarks.kept import Record, Study, measured
 from benchmarks.results import DOCS
 from benchmarks.scores import Stated, bound
 from benchmarks.seeds import FIRST_FRESH
-from benchmarks.virtual.scenarios import BASIN, SCENARIOS
-from benchmarks.virtual.scene import Scene, make_scene
+from benchmarks.virtual.scenarios import SCENARIOS
+from benchmarks.virtual.scene import BASIN, Scene, make_scene
 from scanweld.errors import InputError
 from scanweld.geometry.pose import Pose
 from scanweld.pairs.result import PairKind
@@ -91,7 +91,7 @@ def test_a_run_that_tells_the_truth_is_right():
     assert told("trust-misses", outcome) == "None.\n"
     assert floor_of([outcome], "AUC").asked == ">= 0.99"
     names = [floor.measure for floor in floors([])]
-    assert len(names) == len(set(names)) == 14
+    assert len(names) == len(set(names)) == 15
 
 
 def test_a_wrong_scan_is_falsely_good_only_if_it_is_called_good():
@@ -213,6 +213,8 @@ def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.Mo
     units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
     seeds = (FIRST_FRESH, FIRST_FRESH + 1)
     assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]
+    thrice = Runs(scenarios=(CLEAN, "hand"), seeds=30, times=3).units(False)
+    assert len(thrice) == 3 * SCENARIOS["hand"].seeds + 30 < 3 * (SCENARIOS[CLEAN].seeds + 8)
     assert len(Runs().units(False)) == sum(scenario.seeds for scenario in SCENARIOS.values()) >= 300
 
 
@@ -248,6 +250,14 @@ def test_what_sensors_do_is_asked_to_be_right_and_not_doubted():
     doubted = tuple(s._replace(verdict="doubtful") for s in true.scans[:1])
     floor = floor_of([replace(true, scans=doubted + true.scans[1:])], measure)
     assert floor.is_met is False and floor.reached == "83.3 % of 6" and floor.asked == ">= 95 %"
+
+
+def test_nobody_accuses_clean_scans_of_their_scale():
+    measure, true = "accused of a wrong scale", replace(outcome_of(CLEAN), scenario="file: mesh")
+    told = {"verdict": "doubtful", "reason": "its scale is off: 1.011 times too large"}
+    for changes, is_fine in (({}, True), ({**told, "verdict": "good"}, True), (told, False)):
+        scans = (true.scans[0]._replace(**changes), *true.scans[1:])
+        assert is_met(replace(true, scans=scans), measure) is is_fine
 
 
 def test_two_bodies_are_never_good_and_the_reason_names_them():
