@@ -35,6 +35,16 @@ class ScanOutcome(NamedTuple):
     rotation_deg: float | None = None  # Error of its pose; None where there is none
     translation_percent: float | None = None  # The same, in percent of the object's diameter
     reason: str = ""  # What the report says of it, where it is not both good and right
+    rotation_bound_deg: float | None = None  # That its error keeps within, at 95 %
+    translation_bound_percent: float | None = None  # The same, in percent of the diameter
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether its error keeps within the bounds that are stated."""
+        errors = self.rotation_deg, self.translation_percent
+        bounds = self.rotation_bound_deg, self.translation_bound_percent
+        pairs = zip(errors, bounds, strict=True)
+        return all(e is not None and b is not None and e <= b for e, b in pairs)
 
     @property
     def is_right(self) -> bool:

@@ -128,6 +128,9 @@ def _scan_outcome(
         if np.isfinite(error.rotation_deg):
             told["rotation_deg"] = error.rotation_deg
             told["translation_percent"] = 100 * error.translation / scene.diameter
+    if report.translation_bound is not None:
+        told["rotation_bound_deg"] = report.rotation_bound_deg
+        told["translation_bound_percent"] = 100 * report.translation_bound / scene.diameter
     # Apart from the component with the most scans of its world.
     world = {n for n in scene.truth if scene.worlds[n] == scene.worlds[name]}
     main = max(found.components, key=lambda c: len(world & set(c)), default=())

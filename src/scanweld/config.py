@@ -85,8 +85,9 @@ class PairsConfig(Section):
     """Hypotheses that are kept for the first and for the second refinement."""
     num_alternatives: int = Field(default=8, ge=1)
     """Distinct poses of a pair that are passed to the view graph, at most."""
-    min_score: float = Field(default=0.10, ge=0, le=1)
-    """Score below which a pair is not accepted on its own."""
+    min_score: float = Field(default=0.05, ge=0, le=1)
+    """Score below which a pair is not accepted on its own. Contradictions have a limit of their
+    own, so that little overlap is enough."""
     max_contradiction: float = Field(default=0.10, ge=0)
     """Largest patches of samples that the other sensor contradicts, over what agrees, above which a
     pair is not accepted on its own; more where the set shows that its silhouettes are none."""

@@ -119,7 +119,8 @@ def _assess_pair(
         joint = None
     at_contours = is_accepted or chosen.score > MIN_COHERENT_SCORE
     fit = diagnostics.fit(result.i, result.j, chosen.i_from_j, at_contours=at_contours)
-    grounds = pair_grounds(result, chosen, fit, joint, is_accepted)
+    told = diagnostics.judge.pair(result.i, result.j, chosen.i_from_j)
+    grounds = pair_grounds(result, chosen, told, fit, joint, is_accepted)
     probability = calibration.pair.probability(grounds)
     probability = cap_undecided(probability, result, grounds, config)
     if result.rests_on_feature:

@@ -9,7 +9,7 @@ import numpy as np
 
 from scanweld.confidence.diagnostics import Fit
 from scanweld.confidence.joint_evidence import MIN_CONDUCTANCE, JointEvidence
-from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
 
 Grounds = Mapping[str, float]
@@ -17,6 +17,7 @@ Grounds = Mapping[str, float]
 LEAST_SHARE = 1e-3
 LEAST_OBSERVABILITY = 1e-7
 MAX_MISFIT = 2.0
+MAX_CONTRADICTION = 2.0
 MIN_CORROBORATION = MIN_CONDUCTANCE
 """Conductance between two scans below which other pairs do not hold them together."""
 
@@ -24,6 +25,7 @@ MIN_CORROBORATION = MIN_CONDUCTANCE
 def pair_grounds(
     result: PairResult,
     chosen: Alternative,
+    told: Evidence,
     fit: Fit,
     joint: JointEvidence | None,
     is_accepted: bool,
@@ -36,6 +38,7 @@ def pair_grounds(
     Args:
         result: The pair.
         chosen: The pose.
+        told: The evidence on it, at the tolerance of the set.
         fit: How the two scans lie on each other in it.
         joint: The component that both scans are in, if they are in one.
         is_accepted: Whether the pose agrees with the component's.
@@ -55,7 +58,8 @@ def pair_grounds(
             refutation = max(refutation, min(joint.refutations[k] for k in both))
             observability = max(observability, min(joint.fits[k].observability for k in both))
     return {
-        **_of_evidence(chosen.evidence),
+        "agree": float(np.log10(max(told.agree, LEAST_SHARE))),
+        "contradiction": -min(told.contradiction, MAX_CONTRADICTION),
         "margin": max(margin, -1.0),
         "refutation": refutation,
         "observability": float(np.log10(max(observability, LEAST_OBSERVABILITY))),
@@ -78,11 +82,11 @@ def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) ->
         coherence: The best contour coherence of its accepted pairs.
     """
     said, fit = joint.said_of(k), joint.fits[k]
-    agree = sum(e.agree for e in said)
+    agree, patches = sum(e.agree for e in said), sum(e.patches for e in said)
     return {
         "agree": float(np.log10(max(agree, LEAST_SHARE))),
         "consent": -violated(said),
-        "free": -sum(e.free for e in said) / max(agree, LEAST_SHARE),
+        "contradiction": -min(patches / max(agree, MIN_AGREE), MAX_CONTRADICTION),
         "margin": joint.margins[k],
         "refutation": joint.refutations[k],
         "observability": float(np.log10(max(fit.observability, LEAST_OBSERVABILITY))),
@@ -104,11 +108,3 @@ def violated(said: list[Evidence]) -> float:
     return sum(e.surface_violation for e in said) / max(agree, LEAST_SHARE)
 
 
-def _of_evidence(evidence: Evidence) -> dict[str, float]:
-    agree = max(evidence.agree, LEAST_SHARE)
-    return {
-        "agree": float(np.log10(agree)),
-        "front": -evidence.front / agree,
-        "contradict": -evidence.contradict / agree,
-        "free": -evidence.free / agree,
-    }

@@ -61,10 +61,14 @@ class Evidence:
         return self.front + self.contradict + self.free
 
     @property
+    def patches(self) -> float:
+        """Both patches, that before a surface weighing more."""
+        return FRONT_PATCH_WEIGHT * self.front_patch + self.free_patch
+
+    @property
     def contradiction(self) -> float:
         """Patches that violate, as a share of what agrees."""
-        patches = FRONT_PATCH_WEIGHT * self.front_patch + self.free_patch
-        return patches / max(self.agree, MIN_AGREE)
+        return self.patches / max(self.agree, MIN_AGREE)
 
     def excess(self, max_contradiction: float) -> float:
         """Share of the samples by which patches before surfaces exceed what a set excuses.

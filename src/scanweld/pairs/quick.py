@@ -20,7 +20,7 @@ NUM_QUICK_ANCHORS = 16
 """Evenly spread points of the first scan that are laid onto ``num_anchors`` of the second."""
 NUM_QUICK_SURVIVORS = 80, 16
 """Hypotheses that are refined, far and near."""
-CLEAR_SCORE, CLEAR_MARGIN = 1.5, 1.25
+CLEAR_SCORE, CLEAR_MARGIN = 3.0, 1.25
 """So many times the score and the margin of a good pair make a clear one: fewer rivals were seen.
 How often a clear pair is wrong: docs/performance.md."""
 NO_OVERLAP = "the scans do not overlap where other pairs place them"
