@@ -12,6 +12,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import Viewpoint
 from scanweld.pairs.result import PairKind
+from scanweld.sensor.model import SensorModel
 from scanweld.work.stage_log import StageReport
 
 
@@ -191,6 +192,7 @@ class Reconstruction:
         config: The resolved settings.
         knowledge: What became of the facts that users gave; empty if they gave none.
         prepared: The scans that took part, prepared, by name.
+        sensor: What the set says of its sensor; None where poses were given, and nothing was asked.
     """
 
     poses: Mapping[str, Pose]
@@ -205,3 +207,4 @@ class Reconstruction:
     config: Config
     knowledge: tuple[FactReport, ...] = ()
     prepared: Mapping[str, PreparedScan] = field(default_factory=dict)
+    sensor: SensorModel | None = None

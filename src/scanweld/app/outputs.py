@@ -9,6 +9,7 @@ from scanweld.app.json_text import json_text
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, natural_key, write_mesh_ply, write_poses, write_whole
 from scanweld.reconstruction import PairReport, Reconstruction
+from scanweld.sensor.model import SensorModel
 from scanweld.work.stage_log import StageReport
 
 FORMAT = 1
@@ -66,6 +67,7 @@ def report_json(
         "reasons": list(result.reasons),
         **({"knowledge": facts} if facts else {}),
         **({} if max_points is None else {"max_points": max_points}),
+        **({} if result.sensor is None else {"sensor": _sensor(result.sensor)}),
         "scans": {name: asdict(result.scans[name]) | {"file": files.get(name)} for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),
@@ -98,6 +100,11 @@ def _pair(pair: PairReport) -> Json:
             for other in pair.passed_over
         ],
     }
+
+
+def _sensor(sensor: SensorModel) -> Json:
+    """What the set says of its sensor, in numbers and in words."""
+    return {**asdict(sensor), "words": sensor.words()}
 
 
 def _stage(stage: StageReport) -> Json:

@@ -106,5 +106,3 @@ def violated(said: list[Evidence]) -> float:
     """Samples that other sensors contradict, as a share of those that agree."""
     agree = sum(e.agree for e in said)
     return sum(e.surface_violation for e in said) / max(agree, LEAST_SHARE)
-
-

@@ -18,6 +18,7 @@ from scanweld.evidence.visibility import FREE, FRONT, IS_SURFACE, ask_forward, p
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 
+
 def violating_patches(
     i: ScanField, j: ScanField, i_from_j: Sequence[Pose], tolerance: float
 ) -> FloatArray:

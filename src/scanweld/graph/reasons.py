@@ -2,9 +2,11 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from scanweld.config import GraphConfig
+from scanweld.evidence.evidence import MAX_EXCESS
 from scanweld.evidence.judge import PairJudge
 from scanweld.evidence.slippage import Slide, slide_words
 from scanweld.geometry.arrays import FloatArray
@@ -99,6 +101,11 @@ def find_doubts(graph: ViewGraph, judge: PairJudge, config: GraphConfig) -> dict
     for component in graph.components:
         for k in _rest_on_feature_alone(graph, component):
             doubts[k] = "only a small mark decides its pose: others hide the mark"
+        for k, share in _unexplained(graph, component, judge).items():
+            doubts[k] = (
+                f"a part of {share:.0%} of its surface lies where another sensor saw through: a "
+                "part of the object moved, or a pose is wrong"
+            )
         shares = _violated_shares(graph, component, judge)
         for k, share in shares.items():
             if share > config.max_violated_share:
@@ -122,8 +129,30 @@ def doubt_alone(graph: ViewGraph) -> dict[int, str]:
     return {scans[0]: "no other scan of its component is good" for scans in sure if len(scans) == 1}
 
 
+def best_first(graph: ViewGraph) -> ViewGraph:
+    """The graph with the component of which most scans are good first: it makes the model."""
+    doubtful = set(graph.doubts)
+
+    def rank(component: Component) -> tuple[int, int, int]:
+        scans = set(component.poses)
+        return -len(scans - doubtful), -len(scans), min(scans)
+
+    return replace(graph, components=tuple(sorted(graph.components, key=rank)))
+
+
 def _strength(scan: int, graph: ViewGraph) -> float:
     return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
+
+
+def _unexplained(graph: ViewGraph, component: Component, judge: PairJudge) -> dict[int, float]:
+    """Largest part of each scan, or of one beside it, that no noise puts before a surface."""
+    poses, found = component.poses, dict[int, float]()
+    for i, j in graph.compared(component):
+        evidence = judge.pair(i, j, poses[i].inverse() @ poses[j])
+        if evidence.excess(judge.max_contradiction) > MAX_EXCESS:
+            for k in (i, j):
+                found[k] = max(found.get(k, 0.0), evidence.front_patch)
+    return found
 
 
 def _violated_shares(graph: ViewGraph, component: Component, judge: PairJudge) -> dict[int, float]:

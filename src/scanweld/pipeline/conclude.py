@@ -81,6 +81,7 @@ def conclude(
         config=config,
         knowledge=facts,
         prepared={scan.name: scan for scan in prepared},
+        sensor=scene.sensor,
     )
 
 

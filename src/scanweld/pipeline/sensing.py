@@ -36,9 +36,7 @@ def learnt(registered: Registered, config: Config, stages: Stages) -> Registered
             judge, tolerance=sensor.tolerance, max_contradiction=sensor.max_contradiction
         )
         pairs = _held(registered.pairs, scene, sensor)
-    return replace(
-        registered, scene=replace(scene, judge=judge, sensor=sensor), pairs=pairs
-    )
+    return replace(registered, scene=replace(scene, judge=judge, sensor=sensor), pairs=pairs)
 
 
 def _held(

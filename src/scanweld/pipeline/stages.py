@@ -14,7 +14,7 @@ from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.assemble import build_view_graph
-from scanweld.graph.reasons import doubt_alone, find_doubts
+from scanweld.graph.reasons import best_first, doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
 from scanweld.graph.view_graph import Component, ViewGraph
 from scanweld.knowledge import check
@@ -149,7 +149,7 @@ def assess_placed(
                 reason = f"its pose is right with a probability of {found.confidence:.0%} only"
                 doubts.setdefault(k, reason)
         graph = replace(graph, doubts=doubts)
-        graph = replace(graph, doubts={**doubts, **doubt_alone(graph)})
+        graph = best_first(replace(graph, doubts={**doubts, **doubt_alone(graph)}))
         counts["doubtful"] = len(graph.doubts)
     return graph, confidence
 
@@ -169,7 +169,6 @@ def _bounds(
             component.poses,
             graph.compared(component),
             scene.sensor,
-            scene.judge.diameter,
         ).items()
     }
 
@@ -187,7 +186,7 @@ def check_knowledge(
 def fuse_largest(
     intake: Intake, graph: ViewGraph, config: Config, stages: Stages
 ) -> TriangleMesh | None:
-    """The surface of the largest component's good scans, in its world; None without."""
+    """The surface of the first component's good scans, in its world; None without."""
     if not graph.components:
         return None
     component = graph.components[0]

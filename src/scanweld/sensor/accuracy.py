@@ -33,7 +33,6 @@ def pose_bounds(
     world_from_sensor: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
     sensor: SensorModel,
-    diameter: float,
 ) -> dict[int, PoseTolerance]:
     """Bounds of the error of each pose of a component that hold for 95 % of the scans.
 
@@ -44,13 +43,13 @@ def pose_bounds(
         world_from_sensor: Poses of the component's scans.
         pairs: Scans that are compared, (i, j) in any order.
         sensor: What is known of the sensor.
-        diameter: Of the run, in the scans' unit.
     """
+    diameter = sensor.diameter
     order = sorted(world_from_sensor)
     radius = max(MATCH_SIGMAS * sensor.sigma, 0.006 * diameter)
     found = match_surfaces(sources, world_from_sensor, pairs, radius)
     middles = {k: world_from_sensor[k].apply(sources[k].points.mean(axis=0)) for k in order}
-    covariance = _covariance(found, order, world_from_sensor, middles, sensor, diameter)
+    covariance = _covariance(found, order, world_from_sensor, middles, sensor)
     arm = lever_arm(diameter)
     bounds = {}
     for n, k in enumerate(order):
@@ -70,10 +69,10 @@ def _covariance(
     poses: Mapping[int, Pose],
     middles: Mapping[int, FloatArray],
     sensor: SensorModel,
-    diameter: float,
 ) -> FloatArray:
     """(6 N, 6 N) of twists, each about the middle of its scan, the mean of all being none."""
     place = {k: slice(6 * n, 6 * n + 6) for n, k in enumerate(order)}
+    diameter = sensor.diameter
     size, arm = 6 * len(order), lever_arm(diameter)
     normal = np.zeros((size, size))
     for i, j, matches in found:

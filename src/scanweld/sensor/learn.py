@@ -22,8 +22,12 @@ CERTAIN_MARGIN, CERTAIN_OBSERVABILITY = 0.4, 1e-3
 """It beats its rivals by this share, and slides nowhere."""
 MAX_CERTAIN = 60
 """Pairs that are learnt from, the best first: more say the same."""
-MIN_CERTAIN = 3
+MIN_CERTAIN = 2
 """Fewer say nothing of the set's silhouettes."""
+MAX_LOOKED_PAST = 0.1
+"""If half of the certain pairs show parts in free space of more than this, over what agrees, then
+silhouettes are borders of what was kept. Honest ones have a median of 0.00 to 0.05, trimmed range
+maps of 0.14 to 0.4."""
 REACH_DIAMETERS = 0.04
 """Farthest that surfaces that should coincide may lie apart."""
 TOLERANCE_SIGMAS = 5.0
@@ -69,11 +73,13 @@ def learn_sensor(
             correlated=prior,
             tolerance=usual_tolerance,
             max_contradiction=usual_contradiction,
+            diameter=diameter,
         )
     sigma = 1.4826 * float(np.median(np.abs(residuals)))
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
-    limit = usual_contradiction
+    limit, past = usual_contradiction, 0.0
     if len(certain) >= MIN_CERTAIN:
+        past = float(np.median([_looked_past(pair) for pair in certain]))
         shown = [pair.alternatives[0].evidence.contradiction for pair in certain]
         limit += float(np.quantile(shown, USUAL_SPREAD))
     return SensorModel(
@@ -85,7 +91,15 @@ def learn_sensor(
             max(usual_tolerance, TOLERANCE_SIGMAS * sigma), MAX_TOLERANCE_DIAMETERS * diameter
         ),
         max_contradiction=min(limit, MAX_CONTRADICTION),
+        diameter=diameter,
+        is_trimmed=past > MAX_LOOKED_PAST,
     )
+
+
+def _looked_past(pair: PairResult) -> float:
+    """Largest part of a pair's surface that faces a sensor which looked past it, over what agrees."""
+    told = pair.alternatives[0].evidence
+    return told.free_patch / told.agree
 
 
 def _is_certain(pair: PairResult) -> bool:

@@ -2,6 +2,11 @@
 
 from dataclasses import dataclass
 
+TRIMMED = (
+    "the scans' borders cut through the surface, as of trimmed scans, so that empty pixels speak less "
+    "against a pose"
+)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SensorModel:
@@ -16,6 +21,8 @@ class SensorModel:
         correlated: The part that they share: bent depth, a scale that is a little off.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
+        diameter: Of the run.
+        is_trimmed: Whether borders cut through the surface, so that silhouettes are none.
     """
 
     num_certain: int
@@ -24,14 +31,18 @@ class SensorModel:
     correlated: float
     tolerance: float
     max_contradiction: float
+    diameter: float
+    is_trimmed: bool = False
 
-    def words(self, diameter: float) -> str:
+    def words(self) -> str:
         """The same in a sentence."""
         if not self.num_certain:
             return "too few pairs are certain to say how exact the sensor is: usual values are used"
+        diameter = self.diameter
         pairs = "one certain pair" if self.num_certain == 1 else f"{self.num_certain} certain pairs"
         return (
             f"from {pairs}: surfaces lie {self.sigma / diameter:.2%} of the diameter apart "
             f"({self.white / diameter:.2%} noise, {self.correlated / diameter:.2%} shared by "
             f"neighbours); depth is compared to within {self.tolerance / diameter:.1%}"
+            + (f"; {TRIMMED}" if self.is_trimmed else "")
         )
