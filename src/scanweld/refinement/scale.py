@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS, damped, lever_arm, motion_of
+from scanweld.geometry.gauss_newton import (
+    MAD_TO_SIGMA,
+    SIGNIFICANT_SIGMAS,
+    damped,
+    lever_arm,
+    motion_of,
+)
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.refinement.least_squares import Term, weighted_terms
@@ -98,10 +104,33 @@ def estimate_scales(
             logs[k] -= step
             deviations[k] = float(spread)
     usual = float(np.median([logs[k] for k in order]))
+    excess = _excess_scatter(terms, order, centres, arm)
+    # A sensor whose scans all differ in scale makes none of them an exception.
+    scatter = MAD_TO_SIGMA * float(np.median([abs(logs[k] - usual) for k in order]))
     return {
-        k: ScaleEstimate(factor=float(np.exp(logs[k] - usual)), deviation=deviations[k])
+        k: ScaleEstimate(
+            factor=float(np.exp(logs[k] - usual)), deviation=max(excess * deviations[k], scatter)
+        )
         for k in order
     }
+
+
+def _excess_scatter(
+    terms: Sequence[Term], order: Sequence[int], centres: Mapping[int, FloatArray], arm: float
+) -> float:
+    """How many times more than by their deviations pairs, asked alone, differ from all together.
+
+    Bent depth looks like another scale in each pair. Where scans are truly of another size, all
+    their pairs say the same. It is at least 1 (Birge 1932).
+    """
+    pairs: dict[tuple[int, int], list[Term]] = {}
+    for term in terms:
+        pairs.setdefault((min(term.i, term.j), max(term.i, term.j)), []).append(term)
+    ratios = []
+    for (i, j), both in pairs.items():
+        _, steps, spreads = _solve(both, [i, j], centres, arm)
+        ratios.append(abs(float(steps[0] - steps[1])) / (2.0 * float(spreads[0])))
+    return max(1.0, MAD_TO_SIGMA * float(np.median(ratios)))
 
 
 def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:

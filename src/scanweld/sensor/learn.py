@@ -97,7 +97,7 @@ def learn_sensor(
 
 
 def _looked_past(pair: PairResult) -> float:
-    """Largest part of a pair's surface that faces a sensor which looked past it, over what agrees."""
+    """Largest part that faces a sensor which looked past it, over what agrees."""
     told = pair.alternatives[0].evidence
     return told.free_patch / told.agree
 

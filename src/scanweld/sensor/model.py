@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 TRIMMED = (
-    "the scans' borders cut through the surface, as of trimmed scans, so that empty pixels speak less "
-    "against a pose"
+    "the scans' borders cut through the surface, as of trimmed scans, so that empty pixels speak "
+    "less against a pose"
 )
 
 
