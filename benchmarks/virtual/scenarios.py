@@ -48,17 +48,25 @@ TRIMMED = in_turn(
 NO_GRID = one_of(POINTS, SEEN)
 
 
-def stereo(between_percent: float) -> tuple[Disturbance, ...]:
+def stereo(*, short_percent: float, long_percent: float) -> tuple[Disturbance, ...]:
     """A depth camera of two eyes, the object cut out.
 
     Args:
-        between_percent: Root mean square distance between two scans of the same surface at their
-            true poses, in percent of the diameter, to within a fifth.
+        short_percent: Root mean square distance between two scans of the same surface at their true
+            poses that comes from waves shorter than the object, in percent of the diameter, to
+            within a fifth: no pose takes it away.
+        long_percent: The same of longer waves, which shift and turn the scan for the most part.
     """
-    rms = 0.01 * between_percent / np.sqrt(2.0)
-    waves = {"rms_diameters": (0.8 * rms, 1.2 * rms), "length_diameters": (0.15, 0.35)}
+    short, long = (
+        {"rms_diameters": (0.8 * rms, 1.2 * rms), "length_diameters": lengths}
+        for rms, lengths in (
+            (0.01 * short_percent / np.sqrt(2.0), (0.15, 0.35)),
+            (0.01 * long_percent / np.sqrt(2.0), (1.0, 2.0)),
+        )
+    )
     return (
-        drawn(sensors.depth_waves, **waves),
+        drawn(sensors.depth_waves, **short),
+        drawn(sensors.depth_waves, **long),
         drawn(sensors.stereo_shadow, baseline_diameters=(0.1, 0.3)),
         drawn(sensors.eaten_edges, least=(0.0, 1.5), most=(1.5, 4.0)),
         drawn(sensors.quantised, step_diameters=(0.001, 0.005)),
@@ -144,8 +152,12 @@ SCENARIOS: Mapping[str, Scenario] = {
     # Real sensors
     "trimmed maps": _sensor(views=EIGHT, crop=TRIMMED, min_kept=0.95),
     "no grid": _sensor(disturbances=(NO_GRID,), min_kept=0.97),
-    "correlated error 1.5 %": _sensor(disturbances=stereo(1.5), limits=BASIN, min_kept=0.85),
-    "correlated error 0.5 %": _sensor(disturbances=stereo(0.5), limits=BASIN),
+    "correlated error 1.5 %": _sensor(
+        disturbances=stereo(short_percent=0.5, long_percent=1.4), limits=BASIN, min_kept=0.85
+    ),
+    "correlated error 0.5 %": _sensor(
+        disturbances=stereo(short_percent=0.5, long_percent=0.0), limits=BASIN
+    ),
     "scale +-2 %": _sensor(disturbances=(partial(harm.scales, within=0.02),), limits=BASIN),
     # Not all that is seen moves as one body
     "standing background": _two_bodies(seeds=20, views=TURNTABLE, disturbances=WHOLE_FRAMES),
