@@ -107,10 +107,12 @@ def _in_room(body: Body, noise: NoiseModel, seed: int, rng: Rng) -> list[Shot]:
 
 
 def _stereo(rng: Rng) -> Disturbance:
-    """A depth camera of two eyes, which errs by hardly anything or by up to two percent."""
-    rms, length = 0.02 * 10 ** rng.uniform(-1.3, 0.0), rng.uniform(0.1, 0.7)
+    """A depth camera of two eyes, whose depth is off by short waves and by long ones."""
+    short, long = 0.008 * 10 ** rng.uniform(-1.3, 0.0), 0.015 * 10 ** rng.uniform(-1.3, 0.0)
+    lengths = rng.uniform(0.1, 0.45), rng.uniform(0.8, 2.5)
     return in_turn(
-        each(sensors.depth_waves, rms_diameters=rms, length_diameters=length),
+        each(sensors.depth_waves, rms_diameters=short, length_diameters=lengths[0]),
+        each(sensors.depth_waves, rms_diameters=long, length_diameters=lengths[1]),
         each(sensors.stereo_shadow, baseline_diameters=rng.uniform(0.02, 0.4)),
         each(sensors.eaten_edges, least=rng.uniform(0.0, 1.0), most=rng.uniform(1.0, 4.0)),
         each(sensors.quantised, step_diameters=rng.uniform(0.0005, 0.008)),
