@@ -4,12 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from benchmarks.calibration.scenes import make_set
 from benchmarks.judging.trial import is_right_pair
 from benchmarks.kept import Kept, Result, Unit
 from benchmarks.virtual.scene import Scene
+from scanweld.confidence.model import stored_calibration
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
+from scanweld.evaluation.metrics import evaluate_poses
+from scanweld.geometry.gauss_newton import lever_arm
+from scanweld.io import PoseSet
 from scanweld.pipeline.run import run
 from scanweld.reconstruction import Reconstruction
 
@@ -47,7 +53,8 @@ class Sets(Kept):
             for pair in found.pairs
             if pair.i_from_j is not None
         ]
-        return {"pairs": pairs, "scans": _scans(found, scene)}
+        scans = _with_errors(_scans(found, scene), found, scene)
+        return {"pairs": pairs, "scans": scans}
 
 
 def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
@@ -63,6 +70,34 @@ def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
             }
             for name in component
         ]
+    return records
+
+
+def _with_errors(
+    records: list[dict[str, Any]], found: Reconstruction, scene: Scene
+) -> list[dict[str, Any]]:
+    """Records of right scans with their errors, and the deviations their bounds are made of."""
+    estimate = PoseSet(poses=dict(found.poses), components=found.components)
+    errors = evaluate_poses(
+        estimate, scene.truth, centroids=scene.centroids, diameter=scene.diameter
+    )
+    stored = stored_calibration().bounds
+    for record in records:
+        error, report = errors.scans.get(record["name"]), found.scans[record["name"]]
+        turned, shifted = report.rotation_bound_deg, report.translation_bound
+        if found.sensor is None or error is None or turned is None or shifted is None:
+            continue
+        if record["right"] and np.isfinite(error.rotation_deg):
+            sigma = found.sensor.sigma
+            turn = float(np.degrees(sigma / lever_arm(found.sensor.diameter)))
+            record["errors"] = {
+                "rotation": [error.rotation_deg, stored.rotation.deviation(turned, turn), turn],
+                "translation": [
+                    error.translation,
+                    stored.translation.deviation(shifted, sigma),
+                    sigma,
+                ],
+            }
     return records
 
 

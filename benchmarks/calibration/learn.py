@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.calibration.bounds import learn_bounds
 from benchmarks.calibration.collect import CONFIG
 from benchmarks.calibration.fit import Examples, fit, held_out_probabilities
 from benchmarks.kept import CALIBRATED, Record, code_digest
@@ -56,7 +57,9 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         "digest": digest.hexdigest()[:16],
     }
     return Learned(
-        calibration=Calibration(pair=fit(pairs), scan=fit(scans), made=made),
+        calibration=Calibration(
+            pair=fit(pairs), scan=fit(scans), bounds=learn_bounds(records), made=made
+        ),
         pairs=pairs,
         scans=scans,
         stated_pairs=Stated(np.array(confidences), pairs.is_right),

@@ -23,8 +23,6 @@ from scanweld.geometry.scan import principal_diameter
 STEREO, HARM, SCENERY, STRANGERS = 0.2, 0.4, 0.15, 0.2
 """Share of the sets of a sensor whose errors are correlated, in which something goes wrong besides,
 in which something else is scanned too, and that hold scans of another object of the same family."""
-STANDING = 0.04
-"""Share of the sets in which the object turns before a standing camera that sees the whole room."""
 MAX_SCANS = 6
 MAX_NOISE = 0.01
 OTHER = 500_000
@@ -42,8 +40,6 @@ def make_set(seed: int) -> Scene:
         dropout=float(rng.choice([0.0, 0.01, 0.1, 0.3])),
         grazing_dropout=rng.uniform(0.3, 0.9),
     )
-    if rng.random() < STANDING:
-        return posed(_in_room(body, noise, seed, rng), body, _diameter(body), seed)
     views = _views(body, rng)
     taking = take_shots
     if rng.random() < SCENERY:

@@ -8,16 +8,17 @@ each (Laplace), so that no confidence is above what the number of examples suppo
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
+from scanweld.confidence.bounds import Bounds, BoundScale
 from scanweld.geometry.arrays import FloatArray, frozen
 
-FORMAT = 1
+FORMAT = 2
 MAX_CONFIDENCE = 0.999
 """No calibration is so large, and so like the scans at hand, that more could be said."""
 _FILE = "calibration.json"
@@ -86,11 +87,13 @@ class Calibration:
     Attributes:
         pair: Of the pose of a pair.
         scan: Of the pose of a scan in its component.
+        bounds: Of the errors of poses.
         made: Command, counts and digest of the calibration that they come from.
     """
 
     pair: Model
     scan: Model
+    bounds: Bounds
     made: Mapping[str, Any]
 
     def to_json(self) -> str:
@@ -100,6 +103,7 @@ class Calibration:
             "made": dict(self.made),
             "pair": _model_json(self.pair),
             "scan": _model_json(self.scan),
+            "bounds": asdict(self.bounds),
         }
         return json.dumps(document, indent=1) + "\n"
 
@@ -119,6 +123,7 @@ def read_calibration(text: str) -> Calibration:
     return Calibration(
         pair=_read_model(document["pair"]),
         scan=_read_model(document["scan"]),
+        bounds=Bounds(**{name: BoundScale(**each) for name, each in document["bounds"].items()}),
         made=document["made"],
     )
 

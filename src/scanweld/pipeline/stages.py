@@ -26,7 +26,7 @@ from scanweld.pipeline.problem import graph_problem
 from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
 from scanweld.refinement.scale import ScaleEstimate, estimate_scales
-from scanweld.sensor.accuracy import pose_bounds
+from scanweld.sensor.accuracy import pose_deviations
 from scanweld.sensor.standing import standing_scans
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
@@ -160,17 +160,13 @@ def _bounds(
     """How far the pose of each placed scan may be off."""
     if scene.sensor is None:
         return {}
-    sources = dict(enumerate(diagnostics.sources))
-    return {
-        k: bound
-        for component in graph.components
-        for k, bound in pose_bounds(
-            sources,
-            component.poses,
-            graph.compared(component),
-            scene.sensor,
-        ).items()
-    }
+    sources, sensor = dict(enumerate(diagnostics.sources)), scene.sensor
+    bounds: dict[int, PoseTolerance] = {}
+    for component in graph.components:
+        compared = graph.compared(component)
+        deviations = pose_deviations(sources, component.poses, compared, sensor)
+        bounds.update(stored_calibration().bounds.of(deviations, sensor.sigma, sensor.diameter))
+    return bounds
 
 
 def check_knowledge(

@@ -1,4 +1,4 @@
-"""How exact the poses of a component are: 95 % bounds from information and the sensor's errors.
+"""How exact the poses of a component are, from information and the sensor's errors.
 
 A sensor's noise averages out over a surface, its bent depth does not: neighbouring points are off
 together. So the points of a patch tell no more than the patch: its mean has the correlated error,
@@ -22,19 +22,15 @@ from scanweld.sensor.model import SensorModel
 
 MATCH_SIGMAS = 3.0
 """Farthest match, in standard deviations of the distance between surfaces."""
-BOUND_SIGMAS = 2.0
-"""Bounds in standard deviations."""
-FULL_TURN_DEG, DIAMETERS = 180.0, 1.0
-"""Bounds of what nothing determines: it may be anywhere."""
 
 
-def pose_bounds(
+def pose_deviations(
     sources: Mapping[int, SurfaceSource],
     world_from_sensor: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
     sensor: SensorModel,
 ) -> dict[int, PoseTolerance]:
-    """Bounds of the error of each pose of a component that hold for 95 % of the scans.
+    """Standard deviations of the pose of each scan of a component, over all directions.
 
     Errors are meant beside the component as a whole: its own place is not known, nor needed.
 
@@ -51,16 +47,13 @@ def pose_bounds(
     middles = {k: world_from_sensor[k].apply(sources[k].points.mean(axis=0)) for k in order}
     covariance = _covariance(found, order, world_from_sensor, middles, sensor)
     arm = lever_arm(diameter)
-    bounds = {}
+    deviations = {}
     for n, k in enumerate(order):
         block = covariance[6 * n : 6 * n + 6, 6 * n : 6 * n + 6]
         turn = float(np.sqrt(np.trace(block[:3, :3]))) / arm
         shift = float(np.sqrt(np.trace(block[3:, 3:])))
-        bounds[k] = PoseTolerance(
-            angle_deg=min(BOUND_SIGMAS * float(np.degrees(turn)), FULL_TURN_DEG),
-            shift=min(BOUND_SIGMAS * shift, DIAMETERS * diameter),
-        )
-    return bounds
+        deviations[k] = PoseTolerance(angle_deg=float(np.degrees(turn)), shift=shift)
+    return deviations
 
 
 def _covariance(
