@@ -86,6 +86,8 @@ def estimate_scales(
     logs = dict.fromkeys(poses, 0.0)
     deviations: dict[int, float] = {}
     order: list[int] = []
+    terms: list[Term] = []
+    centres: dict[int, FloatArray] = {}
     for _ in range(NUM_ROUNDS):
         grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
         terms = _surface_terms(grown, poses, pairs, diameter)
