@@ -205,6 +205,9 @@ class ConfidenceConfig(Section):
 
     min_good: float = Field(default=0.9, ge=0, le=1)
     """Confidence below which a placed scan is marked doubtful."""
+    min_accuracy_percent: float | None = Field(default=None, gt=0)
+    """A placed scan is marked doubtful if its surface may be off by more, in percent of the
+    diameter, at 95 %; not asked if not given."""
 
 
 class FusionConfig(Section):

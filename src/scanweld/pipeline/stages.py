@@ -1,6 +1,7 @@
 """The stages of a run, one after the other."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import replace
 
 from scanweld.confidence.assess import Confidence, assess
@@ -143,6 +144,7 @@ def assess_placed(
         confidence = assess(graph, diagnostics, stored_calibration(), config)
         bounds = _bounds(scene, graph, diagnostics)
         confidence = replace(confidence, bounds=bounds)
+        graph = replace(graph, doubts={**_inexact(bounds, scene, config), **graph.doubts})
         doubts = dict(graph.doubts)
         for k, found in confidence.scans.items():
             if found.confidence < config.confidence.min_good:
@@ -152,6 +154,21 @@ def assess_placed(
         graph = best_first(replace(graph, doubts={**doubts, **doubt_alone(graph)}))
         counts["doubtful"] = len(graph.doubts)
     return graph, confidence
+
+
+def _inexact(bounds: Mapping[int, PoseTolerance], scene: Scene, config: Config) -> dict[int, str]:
+    """Scans whose surface may be farther off than is asked for."""
+    asked = config.confidence.min_accuracy_percent
+    if asked is None:
+        return {}
+    radius = 0.5 * scene.judge.diameter
+    reach = {k: bound.shift + bound.angle * radius for k, bound in bounds.items()}
+    percent = {k: 100.0 * far / scene.judge.diameter for k, far in reach.items()}
+    return {
+        k: f"its surface may be off by {far:.2g} % of the diameter; {asked:g} % are asked for"
+        for k, far in percent.items()
+        if far > asked
+    }
 
 
 def _bounds(
