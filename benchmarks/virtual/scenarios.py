@@ -28,7 +28,7 @@ FROM_ABOVE_DEG = (25.0, 40.0)
 
 SIX, FIVE, EIGHT = (partial(ring, count=count) for count in (6, 5, 8))
 ARC = partial(SIX, step_deg=25.0)
-SMALL = partial(FIVE, step_deg=45.0, pixels=(110.0,))
+SMALL = partial(FIVE, step_deg=40.0, pixels=(150.0,))
 ABOVE = partial(SIX, elevations_deg=FROM_ABOVE_DEG)
 TURNED = partial(turned_over, half=partial(FIVE, elevations_deg=FROM_ABOVE_DEG))
 TURNTABLE = partial(turned_before_sensor, count=6)
