@@ -90,7 +90,7 @@ def test_defaults_then_file_then_overrides_and_no_other_change(tmp_path: Path):
     assert config.seed == 4
     assert config.unit == "cm"
     assert config.graph.min_margin == 0.5
-    assert config.graph.max_violation == Config().graph.max_violation
+    assert config.graph.max_violated_share == Config().graph.max_violated_share
     assert load_config(None) == Config()
     with pytest.raises(ConfigError, match="settings: seed"):
         load_config(None, seed=-3)

@@ -45,7 +45,7 @@ DEFINITIONS: Mapping[str, Definition] = {
     ),
     "score": Definition(
         "score",
-        "agree - 3 * front - 1.5 * contradict - free / 3. At most 1.",
+        "agree - 3 * front - 1.5 * contradict - free - grazing / 5. At most 1.",
     ),
     "overlap": Definition(
         "overlap", "agree + contradict: the share of samples that lie on the other scan's surface"
@@ -81,7 +81,11 @@ DEFINITIONS: Mapping[str, Definition] = {
     "occluded": Definition(
         "occluded", "share of samples that lie behind that surface: the sensor could not see them"
     ),
-    "free": Definition("free", "share of samples that lie where the sensor looked past the object"),
+    "free": Definition(
+        "free",
+        "share of samples that lie where the sensor looked past the object, and that it would have "
+        "seen",
+    ),
     "unknown": Definition("unknown", "share of samples of which the sensor can say nothing"),
     "residual": Definition(
         "residual",
