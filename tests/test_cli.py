@@ -245,17 +245,6 @@ def test_unreadable_files_are_named_while_the_rest_goes_on(
     assert (report()["verdict"], report()["exit_code"]) == ("partial", 3)
 
 
-def test_same_stem_twice_gives_relative_paths(scans: Path):
-    for name in ("left", "right"):
-        (scans / name).mkdir()
-        shutil.move(scans / f"{'a' if name == 'left' else 'b'}.ply", scans / name / "s.ply")
-    assert scanweld("run", scans / "left", scans / "right", "-o", "model") == 0
-    assert list(json.loads(Path("model/poses.json").read_text(encoding="utf-8"))["scans"]) == [
-        "left/s",
-        "right/s",
-    ]
-
-
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names of files are text there")
 def test_file_names_that_are_no_utf8_are_spelled_out(scans: Path):
     shutil.move(scans / "a.ply", os.fsdecode(os.fsencode(scans) + b"/\xff.ply"))
