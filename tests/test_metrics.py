@@ -13,12 +13,7 @@ from benchmarks.surface.surface_distances import (
     surface_distances,
 )
 from scanweld.errors import InputError
-from scanweld.evaluation.metrics import (
-    Standing,
-    evaluate_poses,
-    object_diameter,
-    scan_centroids,
-)
+from scanweld.evaluation.metrics import Standing, evaluate_poses, object_diameter, scan_centroids
 from scanweld.evaluation.primitives import sphere
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
