@@ -8,9 +8,8 @@ that hide each other, folds, thin parts, no symmetry, and no two sides alike.
 from dataclasses import dataclass
 
 import numpy as np
+from skimage.measure import marching_cubes
 
-from scanweld.fusion.surface import extract_surface
-from scanweld.fusion.volume import BLOCK, empty_volume
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, compact, pieces
 
@@ -147,8 +146,13 @@ def creature(seed: int = 0, *, voxels: int = 200) -> TriangleMesh:
     for limb in limbs:
         _add_limb(field, axes, limb)
     field += _wrinkles(axes)
-    vertices, faces = _largest_body(*_surface(field, low, step))
-    return TriangleMesh(vertices=vertices * _TRUNK_LENGTH, faces=faces, colors=_coat(vertices))
+    # A node exactly on the surface would give faces without area.
+    field[np.abs(field) < 1e-3 * step] = 1e-3 * step
+    vertices, faces, _, _ = marching_cubes(field, 0.0, spacing=(step, step, step))
+    vertices, faces = _largest_body(vertices.astype(np.float64) + low, faces)
+    return TriangleMesh(
+        vertices=vertices * _TRUNK_LENGTH, faces=_outward(vertices, faces), colors=_coat(vertices)
+    )
 
 
 def _varied(limbs: tuple[Limb, ...], seed: int) -> tuple[Limb, ...]:
@@ -222,21 +226,16 @@ def _coat(vertices: FloatArray) -> ByteArray:
     return np.rint(255 * np.clip(shade * light[:, None], 0, 1)).astype(np.uint8)
 
 
-def _surface(field: FloatArray, low: FloatArray, step: float) -> tuple[FloatArray, IntArray]:
-    """Vertices and outward faces where a field, sampled from a corner on, changes its sign."""
-    whole = np.pad(field, [(0, -n % BLOCK) for n in field.shape], constant_values=np.nan)
-    shape = np.array(whole.shape) // BLOCK
-    volume = empty_volume(low, step, step, np.argwhere(np.ones(shape)))
-    blocks = whole.reshape([n for count in shape for n in (count, BLOCK)])
-    blocks = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(-1, BLOCK, BLOCK, BLOCK)
-    # Outside in: where a face of a cell leaves it open, the body holds together.
-    vertices, inward = extract_surface(volume, -blocks.astype(np.float32))
-    return vertices, inward[:, ::-1]
-
-
 def _largest_body(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """The body with the most vertices: on a coarse grid thin tips come off."""
     body = pieces(faces, len(vertices))
     largest = np.argmax(np.bincount(body))
     vertices, faces, _ = compact(vertices, faces[body[faces[:, 0]] == largest])
     return vertices, faces
+
+
+def _outward(vertices: FloatArray, faces: IntArray) -> IntArray:
+    """Faces counter-clockwise from outside: the volume that they enclose is positive."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    volume = np.einsum("nk,nk->", a, np.cross(b, c))
+    return faces if volume > 0 else faces[:, ::-1]
