@@ -31,11 +31,11 @@ from benchmarks.results import Json, write_results
 from benchmarks.run import timed
 from benchmarks.sets import BUNNY, data_folder
 from benchmarks.surface.subject import RIVALS, Subject, compared, fidelity, seen_of
+from benchmarks.surface.surface_distances import sample_surface
 from scanweld.config import Config, FusionConfig
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.simulate import simulate
-from scanweld.evaluation.surface_errors import sample_surface
 from scanweld.fusion import fuse
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose

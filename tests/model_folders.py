@@ -46,11 +46,7 @@ def good_result(scene: Scene) -> Reconstruction:
         for k, (i, j) in enumerate(combinations(names, 2))
     ]
     return dataclasses.replace(
-        result,
-        poses=scene.world_from_scan,
-        mesh=scene.mesh,
-        pairs=tuple(pairs),
-        scans=scans,
+        result, poses=scene.world_from_scan, mesh=scene.mesh, pairs=tuple(pairs), scans=scans
     )
 
 
@@ -58,8 +54,7 @@ def whole_folder(folder: Path) -> Made:
     """A folder in which everything is good."""
     scene = small_scene()
     return Made(
-        folder=written(folder, good_result(scene)),
-        scans={scan.name: scan for scan in scene.scans},
+        folder=written(folder, good_result(scene)), scans={scan.name: scan for scan in scene.scans}
     )
 
 

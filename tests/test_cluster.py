@@ -45,10 +45,7 @@ def scans() -> tuple[Any, ...]:
 
 
 def result_of(
-    method: str,
-    workers: Any,
-    progress: Progress = silent,
-    cache: Memory | None = None,
+    method: str, workers: Any, progress: Progress = silent, cache: Memory | None = None
 ) -> Reconstruction:
     pairs = PairsConfig(num_anchors=8, num_turns=8, num_survivors=(40, 10))
     config = Config.model_validate(

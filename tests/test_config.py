@@ -11,7 +11,6 @@ from scanweld.config import Config, PairsConfig, Section, load_config
 from scanweld.errors import ConfigError
 
 CHANGED = Config(
-    seed=7,
     unit="mm",
     pairs=PairsConfig(
         keypoints="even", num_turns=36, tolerance_diameters=(0.05, 0.03, 0.01), min_margin=0.25
@@ -37,7 +36,6 @@ def refusal(tmp_path: Path, text: str) -> str:
         ("[pairs]\nmin_scores = 0.1", "pairs.min_scores: no such setting; "),
         ("[pears]\nmin_score = 0.1", "pears: no such setting; "),
         ("[fusion.more]\nx = 1", "fusion.more: no such setting; "),
-        ("seed = -1", "seed: "),
         ("[pairs]\nmin_score = 1.5", "pairs.min_score: "),
         ("[pairs]\nnum_turns = 2", "pairs.num_turns: "),
         ("[pairs]\nkeypoints = 'sift'", "pairs.keypoints: "),
@@ -61,7 +59,7 @@ def test_a_setting_unknown_or_out_of_its_range_is_named(tmp_path: Path, text: st
     assert re.search(f": {place}", refusal(tmp_path, text))
 
 
-@pytest.mark.parametrize("text", ["seed = ", "[pairs", "seed = 1\nseed = 2", "= 3", "a b c\n" * 3])
+@pytest.mark.parametrize("text", ["unit = ", "[pairs", "unit = 1\nunit = 2", "= 3", "a b c\n" * 3])
 def test_text_that_is_no_toml_is_refused(tmp_path: Path, text: str):
     assert "TOML" in refusal(tmp_path, text)
     binary = tmp_path / "binary.toml"
@@ -83,18 +81,24 @@ def test_written_settings_are_complete_and_come_back(tmp_path: Path, config: Con
     assert ("unit" in told) is (config is CHANGED)
 
 
-def test_defaults_then_file_then_overrides_and_no_other_change(tmp_path: Path):
+def test_defaults_then_file_then_overrides_and_no_other_change(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    """A seed, which the settings of 0.1.0 had, is ignored, and said to be."""
     path = tmp_path / "config.toml"
-    path.write_text("seed = 3\nunit = 'cm'\n[graph]\nmin_margin = 0.5\n", encoding="utf-8")
-    config = load_config(path, seed=4, unit=None)
-    assert config.seed == 4
-    assert config.unit == "cm"
+    text = "seed = 3\nmethod = 'paper'\nunit = 'cm'\n[graph]\nmin_margin = 0.5\n"
+    path.write_text(text, encoding="utf-8")
+    config = load_config(path, method="robust", unit=None)
+    assert (config.method, config.unit) == ("robust", "cm")
+    assert [record.message for record in caplog.records] == [
+        f"{path}: seed: is ignored, as a run has nothing random"
+    ]
     assert config.graph.min_margin == 0.5
     assert config.graph.max_violated_share == Config().graph.max_violated_share
     assert load_config(None) == Config()
-    with pytest.raises(ConfigError, match="settings: seed"):
-        load_config(None, seed=-3)
+    with pytest.raises(ConfigError, match="settings: unit"):
+        load_config(None, unit="furlong")
     with pytest.raises(ValidationError):
-        Config().seed = 1  # type: ignore[misc]
+        Config().unit = "mm"  # type: ignore[misc]
     with pytest.raises(ValidationError):
         Config().pairs.min_score = 0.3  # type: ignore[misc]

@@ -14,15 +14,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.prepared import PixelKind
 from scanweld.preparation import prepare
 from scanweld.preparation.silhouette import classify_pixels, close
-from tests.depth_scans import (
-    CONFIG,
-    MODELS,
-    ball,
-    bumps,
-    kind_at,
-    scan_of_depth,
-    xy_of,
-)
+from tests.depth_scans import CONFIG, MODELS, ball, bumps, kind_at, scan_of_depth, xy_of
 
 
 def test_an_enclosed_hole_is_unknown_and_the_outside_is_free():

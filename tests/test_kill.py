@@ -72,9 +72,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {**files, "report": json.dumps(report).encode()}
 
 
-def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same(
-    tmp_path: Path,
-):
+def test_killed_at_random_moments_the_old_output_is_whole_and_the_rerun_the_same(tmp_path: Path):
     """Moments are spread over all of a run; each goes on from what the one before it left."""
     scans = write_scans(tmp_path / "scans", creature_scene(4, pixels=60.0).scans)
     undisturbed, journal = tmp_path / "apart" / "undisturbed", tmp_path / "journal"

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from scanweld.config import ContoursConfig, PrepareConfig
 from scanweld.contours.coherence import ContourPair, contour_pair
 from scanweld.contours.contour_sets import observe_contours
-from scanweld.evaluation.views import ring_of_views
+from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, rotation_exp
@@ -74,7 +74,7 @@ def turned(pose: Pose, degrees: FloatArray, scan: PreparedScan) -> Pose:
 def ring(num: int = 4, model: CameraModel = CameraModel.PINHOLE, factor: float = 1.0) -> Ring:
     """Views at 90 degrees; with fewer than four, the first of them."""
     mesh = small_creature()
-    views = ring_of_views(mesh, 4, 10.0, pixels=140, model=model)[:num]
+    views = [view_of(mesh, 90.0 * k, 10.0, pixels=140, model=model) for k in range(num)]
     scans = scene_of(mesh, views, in_sensor_frames=True).scans
     truth = {
         k: Pose(

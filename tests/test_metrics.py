@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanweld.errors import InputError
-from scanweld.evaluation.metrics import (
-    Standing,
-    evaluate_poses,
-    object_diameter,
-    scan_centroids,
+from benchmarks.surface.surface_distances import (
+    distance_to_triangles,
+    sample_surface,
+    surface_distances,
 )
+from scanweld.errors import InputError
+from scanweld.evaluation.metrics import Standing, evaluate_poses, object_diameter, scan_centroids
 from scanweld.evaluation.primitives import sphere
-from scanweld.evaluation.surface_errors import distance_to_triangles, surface_errors
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.io.poses import PoseSet
@@ -139,21 +139,24 @@ def test_errors_do_not_depend_on_frames(seed: int):
     assert [e.standing for e in after.scans.values()] == [e.standing for e in before.scans.values()]
 
 
-def test_surface_errors_of_concentric_balls():
+def test_distances_of_concentric_balls():
     """Radii 50 and 51: every point is 1 away, and half the ball covers half of it.
 
     Of 20,000 samples a share of one half is off by 0.0035 as a rule: 0.02 is nearly six times that.
     """
     inner, outer = sphere(50.0), sphere(51.0)
-    errors = surface_errors(outer, inner, tolerance=1.1, num_samples=4000)
-    assert errors.accuracy_median == pytest.approx(1.0, abs=0.02)
-    assert errors.accuracy_99 == pytest.approx(1.0, abs=0.06)
-    assert errors.completeness == 1.0
+
+    def distances(of: TriangleMesh, to: TriangleMesh, count: int) -> FloatArray:
+        points, _ = sample_surface(of, count, np.random.default_rng(0))
+        return surface_distances(points, to, num_samples=count)
+
+    apart = distances(outer, inner, 4000)
+    assert np.median(apart) == pytest.approx(1.0, abs=0.02)
+    assert np.percentile(apart, 99) == pytest.approx(1.0, abs=0.06)
     upper = inner.vertices[inner.faces].mean(axis=1)[:, 2] > 0
     half = TriangleMesh(vertices=inner.vertices, faces=inner.faces[upper])
-    errors = surface_errors(half, inner, 0.5, num_samples=20000)
-    assert errors.completeness == pytest.approx(0.5, abs=0.02)
-    assert surface_errors(inner, half, 0.5, num_samples=4000).accuracy_90 > 10
+    assert (distances(inner, half, 20000) <= 0.5).mean() == pytest.approx(0.5, abs=0.02)
+    assert np.percentile(distances(inner, half, 4000), 90) > 10
 
 
 def test_distance_to_a_triangle_by_its_regions():

@@ -5,7 +5,7 @@ import pytest
 
 from scanweld.evaluation.primitives import box, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
-from scanweld.evaluation.views import Axis, View, overlap, ring_of_views, seen_share, view_of
+from scanweld.evaluation.views import Axis, View, overlap, seen_share, view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals
@@ -172,11 +172,6 @@ def test_overlap_of_views_on_a_ball():
     ]
     shares = [overlap(mesh, views[0], view) for view in views]
     np.testing.assert_allclose(shares, [1, 2 / 3, 1 / 3, 0], atol=0.03)
-    mesh = small_creature()
-    views = ring_of_views(mesh, 6, 10, pixels=100)
-    shares = [overlap(mesh, views[0], view) for view in views]
-    assert shares[0] > 0.98
-    assert min(shares[1], shares[5]) > max(shares[2], shares[4]) > shares[3]
 
 
 def test_overlap_knows_what_is_hidden():

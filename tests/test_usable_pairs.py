@@ -208,7 +208,7 @@ def test_pairs_apart_are_not_joined_by_others_and_the_first_fixed_scan_is_the_re
     assert component.poses[3].angle_deg() == 0.0
 
 
-@pytest.mark.parametrize("num_anchors", [8, 40])
+@pytest.mark.parametrize("num_anchors", [8, 64])
 def test_a_start_pose_is_marked_unless_the_search_finds_it_too(num_anchors: int):
     """The pose of a search that finds it is its own; in no case is there a second one near it."""
     pair = creature_pair(80)

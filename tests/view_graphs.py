@@ -187,10 +187,7 @@ def problem_of(
 
 
 def graph_of(
-    world: Sequence[Pose],
-    pairs: Pairs,
-    judge: PairJudge | None = None,
-    settle: Settle = stay,
+    world: Sequence[Pose], pairs: Pairs, judge: PairJudge | None = None, settle: Settle = stay
 ) -> ViewGraph:
     judge = judge or judge_of(world, pairs)
     graph = build_view_graph(problem_of(len(world), pairs, judge, settle))

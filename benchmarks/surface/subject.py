@@ -11,9 +11,9 @@ from scipy.spatial import KDTree
 from benchmarks.results import Json
 from benchmarks.surface.open3d_fusion import Shape, poisson, shape_of, tsdf
 from benchmarks.surface.surface_defects import surface_defects
+from benchmarks.surface.surface_distances import sample_surface, surface_distances
 from benchmarks.virtual.bodies import joined
 from scanweld.config import FusionConfig
-from scanweld.evaluation.surface_errors import sample_surface, surface_distances
 from scanweld.fusion import fuse, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.gauss_newton import damped, jacobian, motion_of, spread_of, tukey_weights

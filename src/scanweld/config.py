@@ -4,6 +4,7 @@ Names say the unit: ``*_diameters`` is a multiple of the scans' diameter, ``*_re
 point spacing, ``*_pixels`` of a range image's footprint on the object, ``*_deg`` an angle.
 """
 
+import logging
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,6 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from scanweld.choices import Component, Holes, Method, Unit
 from scanweld.errors import ConfigError
+
+logger = logging.getLogger(__name__)
 
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -236,11 +239,11 @@ class FusionConfig(Section):
 
 
 class Config(Section):
-    """All settings of a run; ``Config()`` holds the defaults."""
+    """All settings of a run; ``Config()`` holds the defaults.
 
-    seed: int = Field(default=0, ge=0)
-    """Seed of everything random in a run. At present no stage draws random numbers: the scans and
-    the other settings determine every byte of the output."""
+    There is no seed: the scans and the settings determine every byte of the output.
+    """
+
     method: Method = "robust"
     """How poses are found: by an exhaustive search and joint refinement ("robust"), or as
     published, by PA-HKS matches with ICP and MM-ICC ("paper"). The same rules judge both."""
@@ -276,6 +279,8 @@ def load_config(path: Path | None, **overrides: Any) -> Config:
             values = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise ConfigError(f"{path}: cannot be read as TOML settings ({error})") from error
+        if values.pop("seed", None) is not None:  # of 0.1.0, whose model folders stay readable
+            logger.warning("%s: seed: is ignored, as a run has nothing random", path)
     for key, value in overrides.items():
         if isinstance(value, dict) and isinstance(values.get(key, {}), dict):
             given = {name: setting for name, setting in value.items() if setting is not None}

@@ -1,4 +1,16 @@
-"""What scanweld raises: bad input and bad use, never a failed pair."""
+"""What scanweld raises, and with what a command leaves: bad input and bad use, no failed pair."""
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What a command tells the shell; ``USAGE`` holds facts that cannot be about these scans."""
+
+    GOOD = 0
+    ERROR = 1
+    USAGE = 2
+    NOT_GOOD = 3
+    INTERRUPTED = 130
 
 
 class ScanweldError(Exception):

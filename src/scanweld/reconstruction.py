@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from scanweld.config import Config
+from scanweld.errors import ExitCode
 from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.slippage import Slide
 from scanweld.geometry.mesh import TriangleMesh
@@ -28,7 +29,8 @@ class Verdict(StrEnum):
     @property
     def exit_code(self) -> int:
         """0 for good, and where all poses were given; else 3."""
-        return 0 if self in (Verdict.GOOD, Verdict.GIVEN) else 3
+        is_good = self in (Verdict.GOOD, Verdict.GIVEN)
+        return ExitCode.GOOD if is_good else ExitCode.NOT_GOOD
 
 
 class ScanVerdict(StrEnum):

@@ -1,8 +1,4 @@
-"""The command line: thin commands over the library.
-
-Exit codes: 0 good, 1 error, 2 usage (or facts that cannot be about these scans), 3 a verdict other
-than good, 130 interrupted.
-"""
+"""The command line: thin commands over the library; its exit codes are those of ``ExitCode``."""
 
 import sys
 from collections.abc import Sequence
@@ -14,13 +10,9 @@ import typer
 from scanweld.app import cache_commands
 from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
-from scanweld.app.options import NOT_GOOD
-from scanweld.errors import BudgetError, KnowledgeError, ScanweldError
+from scanweld.errors import BudgetError, ExitCode, KnowledgeError, ScanweldError
 
 # What only one command needs is imported inside it: help and small commands then start at once.
-
-ERROR = 1
-USAGE = 2
 
 app = typer.Typer(
     add_completion=False,
@@ -49,7 +41,7 @@ def info(
         except ScanweldError as error:
             _print_error(error)
             failed = True
-    raise typer.Exit(ERROR if failed else 0)
+    raise typer.Exit(ExitCode.ERROR if failed else ExitCode.GOOD)
 
 
 @app.command()
@@ -104,7 +96,8 @@ def evaluate(
 
     errors = compare(estimate, truth, scans)
     typer.echo(comparison_table(errors))
-    raise typer.Exit(0 if errors.count(Standing.RIGHT) == len(errors.scans) else NOT_GOOD)
+    all_right = errors.count(Standing.RIGHT) == len(errors.scans)
+    raise typer.Exit(ExitCode.GOOD if all_right else ExitCode.NOT_GOOD)
 
 
 app.command()(fuse)
@@ -141,4 +134,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
         app(args=with_pairs_joined(given), prog_name="scanweld")
     except ScanweldError as error:
         _print_error(error)
-        sys.exit(USAGE if isinstance(error, (KnowledgeError, BudgetError)) else ERROR)
+        is_usage = isinstance(error, (KnowledgeError, BudgetError))
+        sys.exit(ExitCode.USAGE if is_usage else ExitCode.ERROR)

@@ -9,7 +9,7 @@ from scanweld.app.model_folder import ModelFolder, open_model
 from scanweld.app.options import Wanted
 from scanweld.app.workspace import Workspace
 from scanweld.errors import InputError
-from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.mesh import UNCOLORED, TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import natural_key, path_from, write_whole
@@ -18,9 +18,6 @@ from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.sensor import locate_sensor
-
-NO_COLOR = 128
-"""Grey of points whose scan has no colours where others have."""
 
 
 def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -> list[str]:
@@ -152,7 +149,7 @@ def _points(scans: Mapping[str, RangeScan], poses: Mapping[str, Pose]) -> tuple[
     grey = [name for name, scan in scans.items() if scan.colors is None]
     colors = None
     if len(grey) < len(scans):
-        plain = [np.full((n, 3), NO_COLOR, np.uint8) for n in counts]
+        plain = [np.full((n, 3), UNCOLORED, np.uint8) for n in counts]
         each = zip(scans.values(), plain, strict=True)
         colors = np.concatenate([p if scan.colors is None else scan.colors for scan, p in each])
     data = points_ply_bytes(points, labels, [printed(name) for name in scans], colors)

@@ -20,13 +20,12 @@ from scanweld.app.options import (
     takes,
 )
 from scanweld.choices import Method
+from scanweld.errors import ExitCode
 
 if TYPE_CHECKING:
     from scanweld.knowledge.facts import Knowledge
 
 # What the commands do is imported inside them: help then starts at once.
-
-INTERRUPTED = 130
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +141,7 @@ def run(options: RunOptions) -> None:
         goes_on = kept.exists() and not options.no_cache
         remark = f"the same command goes on from {kept}" if goes_on else "nothing was written"
         typer.echo(f"scanweld: interrupted; {remark}", err=True)
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(ExitCode.INTERRUPTED) from None
     options.show.finish(result, output)
 
 

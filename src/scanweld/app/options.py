@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from scanweld.reconstruction import Reconstruction
     from scanweld.work.progress import Progress
 
-NOT_GOOD = 3
-"""Exit code of a result that is less than it could be."""
-
 Options = TypeVar("Options")
 
 Inputs = Annotated[

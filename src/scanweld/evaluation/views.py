@@ -1,6 +1,5 @@
 """Cameras around an object, and how much of its surface two of them share."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -88,33 +87,9 @@ def view_along(
     return View(camera=camera, world_from_sensor=pose)
 
 
-def ring_of_views(
-    mesh: TriangleMesh,
-    num_views: int,
-    elevation_deg: float = 0.0,
-    *,
-    pixels: float = 300.0,
-    model: CameraModel = CameraModel.PINHOLE,
-    up: Axis = "z",
-) -> list[View]:
-    """Views at even steps of the azimuth, the first at 0."""
-    steps = 360.0 * np.arange(num_views) / num_views
-    return [view_of(mesh, a, elevation_deg, pixels=pixels, model=model, up=up) for a in steps]
-
-
 def overlap(mesh: TriangleMesh, i: View, j: View) -> float:
     """The smaller of the two shares of one view's visible surface that the other one sees too."""
     return min(seen_share(mesh, i, j), seen_share(mesh, j, i))
-
-
-def overlaps(mesh: TriangleMesh, views: Sequence[View]) -> FloatArray:
-    """Overlap of all pairs of views, (N, N) and symmetric, ones on the diagonal."""
-    n = len(views)
-    table = np.eye(n)
-    for i in range(n):
-        for j in range(i):
-            table[i, j] = table[j, i] = overlap(mesh, views[i], views[j])
-    return table
 
 
 def seen_share(mesh: TriangleMesh, i: View, j: View) -> float:

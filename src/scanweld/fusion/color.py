@@ -11,11 +11,10 @@ from scanweld.fusion.noise import MIN_COMMON
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import sample_colors, sample_surface
 from scanweld.geometry.arrays import ByteArray, FloatArray
+from scanweld.geometry.mesh import UNCOLORED
 
 logger = logging.getLogger(__name__)
 
-_UNSEEN = 128.0
-"""Grey of a mesh where scans have colours but none reaches it."""
 _NUM_COMPARED = 20_000
 """Vertices at which the scans' exposures are compared, about."""
 _MIN_FAIR = 0.1
@@ -50,7 +49,7 @@ def blend_colors(
         total += share[:, None] * color / gain
         weight += share
     has_color = weight > 0
-    color = np.full((len(vertices), 3), _UNSEEN)
+    color = np.full((len(vertices), 3), float(UNCOLORED))
     color[has_color] = total[has_color] / weight[has_color, None]
     if has_color.any() and not has_color.all():
         _, nearest = KDTree(vertices[has_color]).query(vertices[~has_color])

@@ -8,7 +8,6 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 GAP_ROUNDS = 2
 """Gaps between measured cells (pixels or voxels) are lost returns, up to this many cells from the
 nearest measured one: they are filled from their neighbours in so many rounds."""
-_NO_FACES = np.empty((0, 3), np.int64)
 
 
 def grid_faces(
@@ -31,7 +30,8 @@ def grid_faces(
         (F, 3) indices of points.
     """
     arrays = np.ascontiguousarray(grid), np.ascontiguousarray(points), np.ascontiguousarray(depth)
-    faces = np.empty((_find_faces(*arrays, max_step, max_edge, _NO_FACES), 3), np.int64)
+    no_faces = np.empty((0, 3), np.int64)
+    faces = np.empty((_find_faces(*arrays, max_step, max_edge, no_faces), 3), np.int64)
     _find_faces(*arrays, max_step, max_edge, faces)
     return faces
 

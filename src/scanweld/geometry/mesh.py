@@ -9,6 +9,8 @@ from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray,
 
 MIN_PIECE_SHARE = 0.002
 """Connected pieces that are smaller than this share of a surface are taken for noise."""
+UNCOLORED = 128
+"""Grey (0 to 255) of what has no colour where the rest has one."""
 BORDER = -1
 """For the face on the other side of an edge, where there is none,"""
 IN_CONFLICT = -2

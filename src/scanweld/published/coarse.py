@@ -16,7 +16,7 @@ from scanweld.pairs.distinct import distinct_poses
 from scanweld.pairs.hypotheses import Anchors, sweep
 from scanweld.pairs.problem import to_pose
 from scanweld.pairs.search import same_hypothesis, score_poses
-from scanweld.published.consensus import agreed_pose
+from scanweld.published.consensus import MAX_POSES, agreed_pose
 from scanweld.published.point_icp import MIN_POINTS, PointAlignment, point_icp
 from scanweld.published.signature_matching import match_signatures
 
@@ -24,12 +24,8 @@ MIN_BREADTH_DIAMETERS = 0.02
 """Matched keypoints that lie on a line to within this, root mean square, hold no pose either."""
 NUM_TURNS = 36
 """Turns about the normal for each pair of keypoints, where the evidence chooses."""
-EVIDENCE_DIAMETERS = PairsConfig().tolerance_diameters[:2]
-"""Depth tolerance of the evidence, of start poses and of answers."""
-MAX_STARTS = 2000
-"""Start poses that are looked at,"""
 NUM_STARTS = 30
-"""and distinct ones that go on to a short ICP,"""
+"""Distinct start poses, of those looked at, that go on to a short ICP,"""
 NUM_SHORT_ROUNDS = 30
 """of so many rounds"""
 NUM_SHORT_SAMPLES = 300
@@ -126,8 +122,8 @@ def _register_by_evidence(
     field_i, field_j = make_field(i), make_field(j)
     anchors_i = Anchors(points=features_i.points, normals=features_i.normals)
     anchors_j = Anchors(points=features_j.points, normals=features_j.normals)
-    coarse, middle = (share * i.diameter for share in EVIDENCE_DIAMETERS)
-    rows, _ = sweep(field_i, field_j, anchors_i, anchors_j, NUM_TURNS, coarse, MAX_STARTS)
+    coarse, middle, _ = (share * i.diameter for share in PairsConfig().tolerance_diameters)
+    rows, _ = sweep(field_i, field_j, anchors_i, anchors_j, NUM_TURNS, coarse, MAX_POSES)
     same = same_hypothesis(i.diameter)
     chosen = distinct_poses(rows, field_j.centre, same.angle, same.shift, NUM_STARTS)
     if len(chosen) == 0:

@@ -20,7 +20,7 @@ MIN_LENGTH_DIAMETERS = 0.1
 COSINE_TOLERANCE = 0.35
 """and the cosines between normals and their connection differ by less."""
 MAX_POSES = 2000
-"""Poses that are looked at: those of the best fits."""
+"""Start poses that are looked at: the best, by whatever they are first ranked by."""
 SUPPORT_DIAMETERS = 0.05
 """A match supports a pose that brings its keypoints to within this."""
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scanweld.config import ContoursConfig
 from scanweld.contours.coherence import LAST_MATCH_PIXELS, OUTLINE_NOISE_PIXELS, coherence
 from scanweld.contours.contour_sets import ObservedContours, observe_contours
-from scanweld.geometry.gauss_newton import spread_of, tukey_weights
+from scanweld.geometry.gauss_newton import lever_arm, spread_of, tukey_weights
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.published.contour_links import (
@@ -245,7 +245,7 @@ def _first_of_part(edges: Sequence[tuple[int, int]], num: int) -> np.ndarray:
 
 def _arm(observed: Mapping[int, ObservedContours]) -> float:
     """The length at which a turn counts like a shift."""
-    return float(np.median([each.scan.diameter for each in observed.values()])) / 3
+    return lever_arm(float(np.median([each.scan.diameter for each in observed.values()])))
 
 
 def _largest_move(

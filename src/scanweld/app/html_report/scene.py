@@ -28,10 +28,8 @@ from scanweld.app.html_report.surface_check import (
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, vertex_normals
 
-MAX_VERTICES = 160_000
-"""Of the model on the page."""
-MAX_POINTS = 160_000
-"""Of all scans together on the page."""
+MAX_SHOWN = 160_000
+"""Vertices of the model on the page, and points of all scans together, at most."""
 RESIDUAL_QUANTILE = 0.98
 """Of the residuals at vertices; the colours end there."""
 NO_VALUE = 255
@@ -81,7 +79,7 @@ class Scene:
 
 def make_scene(mesh: TriangleMesh, borders: OpenBorders, check: SurfaceCheck | None) -> Scene:
     """Thin the model and the scans to what a page can hold."""
-    cluster = cluster_vertices(mesh.vertices, MAX_VERTICES)
+    cluster = cluster_vertices(mesh.vertices, MAX_SHOWN)
     vertices = cluster_means(cluster, mesh.vertices)
     faces = cluster_faces(cluster, mesh.faces)
     colors = None
@@ -117,7 +115,7 @@ def _thinned(check: SurfaceCheck) -> tuple[FloatArray, FloatArray, IntArray]:
     rng = np.random.default_rng(0)  # evenly strided points of a grid would show its columns
     points, directions_, numbers = [], [], []
     for k, (name, all_points) in enumerate(check.points.items()):
-        wanted = len(all_points) * min(total, MAX_POINTS) // max(total, 1)
+        wanted = len(all_points) * min(total, MAX_SHOWN) // max(total, 1)
         chosen = np.sort(rng.permutation(len(all_points))[:wanted])
         points.append(all_points[chosen])
         directions_.append(check.normals[check.nearest[name][chosen]])

@@ -1,6 +1,4 @@
-"""How far a fused surface lies from a reference surface, and how much of it is there."""
-
-from dataclasses import dataclass
+"""How far points lie from a surface, and points spread evenly over one."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -10,57 +8,6 @@ from scanweld.geometry.mesh import TriangleMesh, face_normals
 
 _NUM_NEAREST = 6
 """Triangles that a point is held against: those nearest to it by their samples."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class SurfaceErrors:
-    """Distances between two surfaces, in their unit.
-
-    Attributes:
-        accuracy_median: Half of the model's surface lies closer to the reference than this,
-        accuracy_90: nine tenths of it,
-        accuracy_99: and 99 percent.
-        completeness: Share of the reference surface within the tolerance of the model.
-        tolerance: That tolerance.
-    """
-
-    accuracy_median: float
-    accuracy_90: float
-    accuracy_99: float
-    completeness: float
-    tolerance: float
-
-
-def surface_errors(
-    model: TriangleMesh,
-    reference: TriangleMesh,
-    tolerance: float,
-    *,
-    num_samples: int = 100_000,
-    seed: int = 0,
-) -> SurfaceErrors:
-    """Compare two surfaces in the same frame by samples spread evenly over their area.
-
-    Args:
-        model: The surface that is judged.
-        reference: The surface that is true.
-        tolerance: Distance up to which a point of the reference counts as covered.
-        num_samples: On each surface.
-        seed: Of the samples.
-    """
-    rng = np.random.default_rng(seed)
-    on_model, model_faces = sample_surface(model, num_samples, rng)
-    on_reference, reference_faces = sample_surface(reference, num_samples, rng)
-    accuracy = _distances(on_model, reference, on_reference, reference_faces)
-    coverage = _distances(on_reference, model, on_model, model_faces)
-    median, nine_tenths, most = np.percentile(accuracy, [50, 90, 99])
-    return SurfaceErrors(
-        accuracy_median=float(median),
-        accuracy_90=float(nine_tenths),
-        accuracy_99=float(most),
-        completeness=float(np.mean(coverage <= tolerance)),
-        tolerance=tolerance,
-    )
 
 
 def sample_surface(
