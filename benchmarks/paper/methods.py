@@ -1,7 +1,7 @@
 """All methods of the study by name, and what they make of a pair whose truth is known."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +9,6 @@ from benchmarks.paper.baselines import cpd, fpfh, gicp, kiss, own
 from benchmarks.paper.baselines.records import Method
 from benchmarks.paper.views import KnownPair
 from benchmarks.study.optional import is_usable, need
-from benchmarks.study.plots import Curve
 from scanweld.geometry.pose import Pose
 
 
@@ -53,11 +52,6 @@ METHODS: dict[str, Entry] = {
 }
 """In the order in which tables show them."""
 BY_TITLE = {entry.title: name for name, entry in METHODS.items()}
-
-
-def curve(name: str, shares: Sequence[float]) -> Curve:
-    """Shares of a method as plots draw them."""
-    return Curve(shares, METHODS[name].color, is_strong=name in ("default", "paper"))
 
 
 def try_methods(

@@ -8,11 +8,10 @@ from types import ModuleType
 import pytest
 from jinja2 import UndefinedError
 
-from benchmarks.blocks import BLOCK
+from benchmarks.blocks import BLOCK, TEMPLATES, grid
 from benchmarks.paper import method
 from benchmarks.paper.__main__ import TABLES
 from benchmarks.paper.pages import write_index, write_page
-from benchmarks.study.pages import grid, rendered
 from benchmarks.study.study import read_records
 from scanweld.errors import InputError
 from scanweld.evidence.evidence import MIN_AGREE
@@ -50,11 +49,11 @@ def test_method_is_what_its_template_and_the_results_make():
     assert committed == method.method_text(PAPER), "run python -m benchmarks.paper --pages"
 
 
-def test_a_template_refuses_to_leave_a_number_out(tmp_path: Path):
-    (tmp_path / "page.md").write_text("{{=evidence.evidence.MIN_AGREE}} {{ told.number }}")
-    assert rendered(tmp_path / "page.md", {"told": {"number": 3}}) == f"{MIN_AGREE:g} 3"
+def test_a_template_refuses_to_leave_a_number_out():
+    page = TEMPLATES.from_string("{{=evidence.evidence.MIN_AGREE}} {{ told.number }}")
+    assert page.render(told={"number": 3}) == f"{MIN_AGREE:g} 3"
     with pytest.raises(UndefinedError, match="number"):
-        rendered(tmp_path / "page.md", {"told": {}})
+        page.render(told={})
 
 
 def test_a_missing_result_is_told_in_one_line(tmp_path: Path):

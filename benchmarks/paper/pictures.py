@@ -32,7 +32,7 @@ from benchmarks.paper.drawing import (
 from benchmarks.paper.figures import pair_of, subject
 from benchmarks.paper.heat_field import HeatField, heat_field
 from benchmarks.paper.methods import METHODS
-from benchmarks.paper.pages.placed import Placed
+from benchmarks.paper.placed import Placed
 from benchmarks.paper.settings import SETTINGS, scans_of
 from benchmarks.paper.views import MADE, virtual_scan
 from benchmarks.study.records import Records, grouped, of, values_of
@@ -77,7 +77,7 @@ def draw(records: Records, out: Path) -> None:
         "heat": _heat,
         "gallery": _gallery,
     }
-    for figure, own in grouped(records, "figure").items():
+    for figure, own in grouped(records, "{figure}").items():
         draw_figure[figure](own, out)
 
 
@@ -282,7 +282,7 @@ def _gallery(records: Records, out: Path) -> None:
         width = min(WIDTH // len(numerals), 534)
         rows = [
             [_gallery_panel(of(at_start, setting=n)[0], method, width) for n in numerals]
-            for at_start in grouped(own, "start_deg").values()
+            for at_start in grouped(own, "{start_deg}").values()
             for method in ("m-icc", "mm-icc")
         ]
         draw_sheet(rows, out / f"fig6{letter}-gallery-{name}.png", letters=False)
