@@ -32,7 +32,7 @@ def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) 
         "records": records,
     }
     measuring = import_module(f"benchmarks.paper.{name}")
-    values = [vars(methods), vars(settings), vars(measuring), vars(told), page]
+    values = [vars(pictures), vars(methods), vars(settings), vars(measuring), vars(told), page]
     text = rendered(f"paper/{name}", **reduce(or_, values)).rstrip() + "\n"
     write_whole(out / f"{name}.md", text.encode())
     return text

@@ -87,11 +87,6 @@ def gap_of(record: Record) -> int:
     return round(second - first)
 
 
-def count(points: Sequence[Any]) -> str:
-    """How many points there are."""
-    return f"{len(points):,}"
-
-
 def by_object(records: Records) -> dict[str, Records]:
     """Records of settings of Table 2 by their object."""
     names = {numeral: SETTINGS[numeral].name for numeral in values_of(records, "setting")}
