@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.blocks import TEMPLATES
-from benchmarks.paper import settings, told
-from benchmarks.paper.ablations import parts, search
+from benchmarks.paper import ablations, settings, told
+from benchmarks.paper import ablations_search as search
 from benchmarks.results import DATA, read_results
 from benchmarks.scores import Stated
 from benchmarks.study.records import Records, results
@@ -37,7 +37,7 @@ def method_text(folder: Path, others: Path = DATA) -> str:
         with measured_by("make benchmarks"):
             return read_results(others / f"{name}.json")["records"]
 
-    names = {"Config": Config, "parts": parts, "search": search, "study": study, "other": other}
+    names = {"Config": Config, "parts": ablations, "search": search, "study": study, "other": other}
     names |= {"auc": auc, "middle_share": middle_share, "schedules": schedules(1.0)}
     return TEMPLATES.get_template(TEMPLATE).render(vars(settings) | vars(told) | names)
 
