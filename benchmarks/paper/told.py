@@ -34,45 +34,13 @@ BASIN = Limit(deg=5, percent=2)
 REFINED = METHODS.keys() - {"paper-coarse"}
 """What is not refined is held to the basin."""
 
-PRINTED_GAPS = list(range(10, 100, 10))
-PRINTED = {
-    "M-ICC": ("< 1", "< 1", "< 1", "< 1", "< 1", "< 1", "58", "58", "62"),
-    "Proposed": ("< 1",) * 9,
-}
-"""The paper's Table 1: rotation error in degrees at these gaps,"""
-OURS = (
-    *(("m-icc", "identity"), ("paper", "identity"), ("default", "identity")),
-    *(("paper", "random"), ("default", "random")),
-)
-"""and what stands beside it."""
 NEAR_GAP = 90
 """To this gap every pair must be right; beyond it the overlap says what can be asked."""
-M_ICC_GAP = 60
-"""To this gap the paper's M-ICC succeeds."""
-EASY_GAP = 30
-"""To this gap signatures that change with the silhouette might still match."""
 OVERLAPS = ((0.15, 1.01, 0.95), (0.10, 0.15, 0.80), (0.0, 0.10, None))
 """From, below, and the share of pairs that must be right there."""
 STARTS_OF = {"identity": "the paper's start", "random": "any start"}
 
 BINS = ((0.4, 1.01), (0.25, 0.4), (0.15, 0.25), (0.10, 0.15), (0.05, 0.10), (0.0, 0.05))
-HALVES = ((0.15, 1.01), (0.05, 0.15), (0.0, 0.05))
-"""What the words on real pairs speak of."""
-
-FEW = 30
-"""Fewer answers on features than this are told as a fraction."""
-USUAL = (30, 90)
-"""Gaps of the table that says it all at once."""
-QUESTIONS = {
-    "Keypoints, repeated": ("detectors", "repeated"),
-    **{
-        f"Descriptors at {where}, {question}": (group, question)
-        for group, where in (("own", "their keypoints"), ("even", "evenly spread points"))
-        for question in ("nearest", "mutual", "among 8")
-    },
-}
-"""A group of rows in the results, and what was asked of them."""
-
 TITLES = {"m-icc": "M-ICC", "mm-icc": "MM-ICC", "joint": "joint refinement", "default": "default"}
 """Of the methods of Table 2."""
 COMPLEX = ("ii", "iii", "v", "vi", "vii")
