@@ -26,6 +26,7 @@ from benchmarks.blocks import rendered
 from benchmarks.results import Json, write_results
 from benchmarks.scores import Stated
 from benchmarks.sets import OBJECTS, PairSet, data_folder, made_pairs, moved_scans, real_pairs
+from benchmarks.study.plots import save, subplots
 from scanweld.config import Config, PairsConfig
 from scanweld.evaluation.metrics import MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT, object_diameter
 from scanweld.geometry.pose import Pose
@@ -199,12 +200,7 @@ def are_floors_met(answers: Sequence[Json]) -> bool:
 
 def plot(answers: Sequence[Json], path: Path) -> None:
     """Score against overlap, right and wrong, and the share of right answers by overlap."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(11, 4.2))
     given = [a for a in answers if a["score"] is not None]
     for is_right, color, label in ((False, "#c0392b", "wrong"), (True, "#2471a3", "right")):
         chosen = [a for a in given if (a["rank"] == 1) is is_right]
@@ -223,9 +219,7 @@ def plot(answers: Sequence[Json], path: Path) -> None:
     right.set_xticks(places, [f"{a:g}\n–{b:g}" for a, b in pairwise(edges)])
     right.set(xlabel="overlap (above the bars: pairs)", ylabel="right as first answer")
     right.set_ylim(0, 1.1)
-    figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    save(figure, path)
 
 
 if __name__ == "__main__":
