@@ -5,7 +5,7 @@ from functools import lru_cache
 
 from scipy.spatial import KDTree
 
-from benchmarks.features.spectrum import Spectrum, spectrum_of
+from benchmarks.features.spectral import Spectrum, spectrum_of
 from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.prepared import PreparedScan
