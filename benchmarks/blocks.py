@@ -14,6 +14,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.ext import Extension
 
@@ -116,4 +117,11 @@ TEMPLATES = Environment(
     keep_trailing_newline=True,
 )
 TEMPLATES.globals.update(judged=judged, floored=floored, grid=grid)
-TEMPLATES.filters.update(percent=percent)
+TEMPLATES.filters.update(
+    flat=lambda lists: [each for some in lists for each in some],
+    mean=lambda values: np.mean(list(values)),
+    median=lambda values, axis=None: np.nanmedian(list(values), axis=axis),
+    percent=percent,
+    quantile=lambda values, q: np.quantile(list(values), q),
+    total=lambda rows: np.sum(rows, axis=0),
+)

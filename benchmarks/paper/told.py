@@ -147,11 +147,4 @@ _HELPERS = ("answers", "beyond", "by_overlap", "grouped", "of", "overlap_title",
 TEMPLATES.globals.update(
     {name: vars(picking)[name] for name in (*_HELPERS, "results", "up_to", "values_of")}
 )
-TEMPLATES.filters.update(
-    flat=lambda lists: [each for some in lists for each in some],
-    mean=lambda values: np.mean(list(values)),
-    median=lambda values, axis=None: np.nanmedian(list(values), axis=axis),
-    quantile=lambda values, q: np.quantile(list(values), q),
-    rms_mm=rms_mm,
-    total=lambda rows: np.sum(rows, axis=0),
-)
+TEMPLATES.filters.update(rms_mm=rms_mm)
