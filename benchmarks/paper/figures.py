@@ -75,14 +75,11 @@ def _gallery_unit(numeral: str, degrees: int, seeds: int) -> Unit:
 
 def measure(unit: Unit) -> Result:
     """Poses, keypoints and contours that a figure shows."""
-    return {
-        "pa-hks": _keypoints,
-        "prunings": _contours,
-        "coarse": _pair,
-        "four views": _four_views,
-        "heat": _heat,
-        "gallery": _gallery,
-    }[unit["figure"]](unit)
+    measuring = {
+        **{"pa-hks": _keypoints, "prunings": _contours, "coarse": _pair},
+        **{"four views": _four_views, "heat": _heat, "gallery": _gallery},
+    }
+    return measuring[unit["figure"]](unit)
 
 
 def subject(name: str, azimuth_deg: float | None) -> PreparedScan:

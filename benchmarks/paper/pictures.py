@@ -1,7 +1,6 @@
 """The pictures on the page of the figures, drawn from what was measured, and words about them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -70,12 +69,8 @@ STEPS = {
 def draw(records: Records, out: Path) -> None:
     """Draw all figures that were measured."""
     draw_figure = {
-        "pa-hks": _keypoints,
-        "prunings": _prunings,
-        "coarse": _coarse,
-        "four views": _four_views,
-        "heat": _heat,
-        "gallery": _gallery,
+        **{"pa-hks": _keypoints, "prunings": _prunings, "coarse": _coarse},
+        **{"four views": _four_views, "heat": _heat, "gallery": _gallery},
     }
     for figure, own in grouped(records, "{figure}").items():
         draw_figure[figure](own, out)
@@ -136,27 +131,18 @@ def _keypoint_row(scan: PreparedScan, result: Mapping[str, Any]) -> list[Panel]:
     is_moved = np.linalg.norm(after - before, axis=1) > 1e-6 * scan.diameter
     look = look_at(scan.mesh.vertices, _FROM_FRONT, _UP, size)
     behind = look_at(mesh.vertices, _FROM_BEHIND, _UP, size)
-    left = balls(before[is_moved], 0.8 * radius, ACCENT)
+    left, black = balls(before[is_moved], 0.8 * radius, ACCENT), balls(after, radius, INK)
     ways = Lines(look.pixels(np.stack([before, after], axis=1)[is_moved]), ACCENT, 2.6)
     faces = f"{result['front_faces']:,} + {result['other_faces']:,} faces"
-    told = f"{len(after)} maxima, {result['moved']} moved off the rim"
-    shown = (
-        (
-            render([colored(scan.mesh, SCANS[3])], look),
-            "range scan",
-            f"{result['pixels']:,} pixels",
-        ),
-        (render([mesh], behind), "artificial mesh", faces),
-        (render([pale, balls(after, radius, INK), left], look), "shifted to the front", told),
-        (
-            render([pale, balls(grouped, radius, INK)], look),
-            "grouped",
-            f"{len(grouped)} keypoints",
-        ),
-    )
-    panels = [Panel(picture, title, [(note, QUIET)]) for picture, title, note in shown]
-    panels[2] = replace(panels[2], lines=[ways])
-    return panels
+    maxima = f"{len(after)} maxima, {result['moved']} moved off the rim"
+    kept, found = f"{len(grouped)} keypoints", [pale, balls(grouped, radius, INK)]
+    seen, pixels = [colored(scan.mesh, SCANS[3])], f"{result['pixels']:,} pixels"
+    return [
+        Panel(render(seen, look), "range scan", [(pixels, QUIET)]),
+        Panel(render([mesh], behind), "artificial mesh", [(faces, QUIET)]),
+        Panel(render([pale, black, left], look), "shifted to the front", [(maxima, QUIET)], [ways]),
+        Panel(render(found, look), "grouped", [(kept, QUIET)]),
+    ]
 
 
 def _artificial_mesh(field: HeatField) -> TriangleMesh:
@@ -291,4 +277,4 @@ def _gallery_panel(record: Record, method: str, width: int) -> Panel:
     right = f"{result['converged']} of {record.unit['seeds']} right"
     title = f"{METHODS[method].title} from {record.unit['start_deg']}°"
     panel = placed.panel(_poses(result), title, f"RMS {rms(record, result)}, {right}")
-    return replace(panel, notes=[*panel.notes, (views, QUIET)])
+    return panel._replace(notes=[*panel.notes, (views, QUIET)])
