@@ -14,21 +14,13 @@ from scanweld.geometry.pose import Pose
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A method of the study.
+    """A method of the study."""
 
-    Attributes:
-        title: For people.
-        run: The method.
-        color: Of its curves: the project's own are strong, what needs a start is grey.
-        uses_start: Whether it starts at the given pose; else the pose makes no difference.
-        needs: Modules of the extra ``bench`` that it imports.
-    """
-
-    title: str
+    title: str  # For people
     run: Method
-    color: str
-    uses_start: bool = False
-    needs: tuple[str, ...] = ()
+    color: str  # Of its curves: the project's own are strong, what needs a start is grey
+    uses_start: bool = False  # Else the given pose makes no difference
+    needs: tuple[str, ...] = ()  # Modules of the extra ``bench`` that it imports
 
 
 METHODS: dict[str, Entry] = {

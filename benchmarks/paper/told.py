@@ -10,20 +10,8 @@ from benchmarks.blocks import TEMPLATES
 from benchmarks.paper.basins import DEFAULT, FROM_A_START, JOINT
 from benchmarks.paper.methods import METHODS
 from benchmarks.paper.settings import NUMERALS, SETTINGS, is_converged
-from benchmarks.study import records as picking
-from benchmarks.study.records import (
-    Answer,
-    Limit,
-    Records,
-    answers,
-    beyond,
-    of,
-    overlap_title,
-    overlapping,
-    results,
-    up_to,
-    values_of,
-)
+from benchmarks.study import records as pick
+from benchmarks.study.records import Answer, Limit, Records
 from benchmarks.study.study import Record
 from scanweld.geometry.arrays import FloatArray
 
@@ -49,8 +37,8 @@ COMPLEX = ("ii", "iii", "v", "vi", "vii")
 
 def best_but_default(records: Records, limit: Limit, methods: Iterable[str]) -> str | None:
     """Which of some other methods is right most often; None if none was tried."""
-    tried = [m for m in METHODS if m in methods and m != "default" and answers(records, m)]
-    return max(tried, key=lambda m: limit.share(answers(records, m)), default=None)
+    tried = [m for m in METHODS if m in methods and m != "default" and pick.answers(records, m)]
+    return max(tried, key=lambda m: limit.share(pick.answers(records, m)), default=None)
 
 
 def degrees(told: Iterable[Answer]) -> list[float]:
@@ -66,23 +54,27 @@ def noise_title(noise: float) -> str:
 def floors_of_pairs(records: Records) -> Iterator[tuple[str, Records, Limit, float]]:
     """What is asked of the default: in words, of which pairs, how exact, and of what share."""
     floors = [(low, high, floor) for low, high, floor in OVERLAPS if floor is not None]
-    for value in values_of(records, "noise"):
-        noise, chosen = noise_title(value), of(records, noise=value)
-        for protocol, name in product(values_of(chosen, "protocol"), values_of(chosen, "object")):
-            near = up_to(of(chosen, object=name, protocol=protocol), NEAR_GAP)
+    for value in pick.values_of(records, "noise"):
+        noise, chosen = noise_title(value), pick.of(records, noise=value)
+        for protocol, name in product(
+            pick.values_of(chosen, "protocol"), pick.values_of(chosen, "object")
+        ):
+            near = pick.up_to(pick.of(chosen, object=name, protocol=protocol), NEAR_GAP)
             yield f"{name}, {STARTS_OF[protocol]}, to {NEAR_GAP}°, {noise}", near, RIGHT, 1.0
-        pairs = of(chosen, protocol="random")
+        pairs = pick.of(chosen, protocol="random")
         for low, _, floor in floors:
             where = f"any start, any gap, overlap from {low:.2f}, {noise}"
-            yield where, overlapping(pairs, low, 1.01), TIGHT, floor
+            yield where, pick.overlapping(pairs, low, 1.01), TIGHT, floor
         for low, high, floor in floors:
-            where = f"any start, beyond {NEAR_GAP}°, overlap {overlap_title(low, high)}, {noise}"
-            yield where, overlapping(beyond(pairs, NEAR_GAP), low, high), TIGHT, floor
+            where = (
+                f"any start, beyond {NEAR_GAP}°, overlap {pick.overlap_title(low, high)}, {noise}"
+            )
+            yield where, pick.overlapping(pick.beyond(pairs, NEAR_GAP), low, high), TIGHT, floor
 
 
 def pooled(records: Iterable[Record], group: str, question: str, entry: str) -> FloatArray:
     """Right, asked and by chance right (3,) of a detector or descriptor, over all records."""
-    told = [found.get(question, [0, 0, 0]) for found in results(records, group, entry)]
+    told = [found.get(question, [0, 0, 0]) for found in pick.results(records, group, entry)]
     return np.array(told, dtype=np.float64).reshape(-1, 3).sum(axis=0)
 
 
@@ -97,12 +89,12 @@ def from_starts(records: Records) -> dict[str, str]:
 def answers_from(records: Records, start: int, method: str) -> list[Answer]:
     """Errors of a method from a start; those of the default are the same from all."""
     path = [DEFAULT] if method == DEFAULT else ["answers", str(start), method]
-    return results(records, *path)
+    return pick.results(records, *path)
 
 
 def runs(records: Records, **wanted: object) -> list[Run]:
     """The runs of all records that have these values."""
-    told = chain.from_iterable(results(records, "runs"))
+    told = chain.from_iterable(pick.results(records, "runs"))
     return [run for run in told if all(run[key] == value for key, value in wanted.items())]
 
 
@@ -145,6 +137,6 @@ def floors_of_settings(records: Records) -> dict[str, list[str]]:
 
 _HELPERS = ("answers", "beyond", "by_overlap", "grouped", "of", "overlap_title", "overlapping")
 TEMPLATES.globals.update(
-    {name: vars(picking)[name] for name in (*_HELPERS, "results", "up_to", "values_of")}
+    {name: vars(pick)[name] for name in (*_HELPERS, "results", "up_to", "values_of")}
 )
 TEMPLATES.filters.update(rms_mm=rms_mm)

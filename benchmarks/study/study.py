@@ -53,23 +53,15 @@ class Table(Protocol):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Study:
-    """Where a study keeps its work, and how many processes do it.
+    """Where a study keeps its work, and how many processes do it."""
 
-    Attributes:
-        out: Folder of the pages; their JSON goes to ``out / "data"``.
-        work: Folder of finished units, so that an interrupted study goes on where it stopped.
-        workers: Processes.
-        quick: Whether a handful of units will do.
-        command: What the user typed, for the JSON.
-        code: Patterns of the files that measure: units that other code measured do not count.
-            ``{table}`` in them stands for the name of the table.
-    """
-
-    out: Path
-    work: Path
-    workers: int
-    quick: bool
-    command: str
+    out: Path  # Folder of the pages; their JSON goes to ``out / "data"``
+    work: Path  # Of finished units, so that an interrupted study goes on where it stopped
+    workers: int  # Processes
+    quick: bool  # Whether a handful of units will do
+    command: str  # What the user typed, for the JSON
+    # Patterns of the files that measure: units that other code measured do not count. ``{table}``
+    # in them stands for the name of the table.
     code: tuple[str, ...] = (PACKAGE,)
 
     def records(self, table: Table, advance: Callable[[int, int], None]) -> list[Record]:
