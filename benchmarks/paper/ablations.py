@@ -9,7 +9,7 @@ from benchmarks.paper import ablations_search as search
 from benchmarks.paper.baselines.feature_views import is_seen
 from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined, right_matches
 from benchmarks.paper.real import real_pair
-from benchmarks.paper.settings import STUDY
+from benchmarks.paper.settings import REPEATED_DIAMETERS, RIGHT_DIAMETERS, STUDY
 from benchmarks.paper.views import MADE, KnownPair, overlap_of, pair_units, virtual_pair
 from benchmarks.study.study import Result, Unit
 from scanweld.config import ContoursConfig, HeatConfig
@@ -25,10 +25,6 @@ HEAT, COARSE = STUDY["heat"], STUDY["coarse"]
 PUBLISHED, ALONE, CLOSED = "MM-ICC as published", "contours alone", "closed, cut at jumps"
 PERCENTILES = (25, 50, 75, 90)
 TERMS_NOISE, TERMS_START_DEG = STUDY["parts"]["terms"]["more"]["noise"], 2.0
-REPEATED_DIAMETERS = 0.04
-"""A keypoint is repeated if the other view has one within this distance,"""
-RIGHT_DIAMETERS = 0.06
-"""and a match is right within this one."""
 
 
 def units(quick: bool) -> list[Unit]:

@@ -1,7 +1,7 @@
 """Figures 1 to 6 of the paper, on the same objects and at the same view gaps."""
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from benchmarks.paper.baselines.own import aligned, jointly_refined
 from benchmarks.paper.heat_field import HeatField, heat_field
 from benchmarks.paper.methods import METHODS
 from benchmarks.paper.views import (
-    MADE,
     KnownPair,
     VirtualScan,
     data_file,
@@ -46,26 +45,10 @@ PAIR_METHODS = ("m-icc", "paper-coarse", "default")
 def units(quick: bool) -> list[Unit]:
     """A unit for each figure, or for each row or column of it."""
     if quick:
-        return [
-            {"figure": "pa-hks", "subject": MADE, "azimuth_deg": 60.0},
-            {"figure": "prunings", "object": MADE, "azimuths_deg": [45.0, 105.0]},
-            {"figure": "heat", "object": MADE, "azimuths_deg": [60.0, 90.0]},
-            _gallery_unit(settings.QUICK, 20, seeds=1),
-        ]
-    return [
-        {"figure": "pa-hks", "subject": "armadillo", "azimuth_deg": 180.0},
-        {"figure": "pa-hks", "subject": "bun000", "azimuth_deg": None},
-        {"figure": "prunings", "object": "armadillo", "azimuths_deg": [150.0, 210.0]},
-        {"figure": "prunings", "object": "armadillo", "azimuths_deg": [135.0, 225.0]},
-        {"figure": "coarse", "object": "armadillo", "azimuths_deg": [145.0, 215.0]},
-        {"figure": "four views", "setting": "vii"},
-        {"figure": "heat", "object": "armadillo", "azimuths_deg": [120.0, 160.0, 200.0, 240.0]},
-        *(
-            _gallery_unit(numeral, degrees, GALLERY_SEEDS)
-            for degrees in GALLERY_START_DEG
-            for numeral in settings.NUMERALS
-        ),
-    ]
+        return [*settings.STUDY["quick-figures"], _gallery_unit(settings.QUICK, 20, seeds=1)]
+    gallery = product(GALLERY_START_DEG, settings.NUMERALS)
+    gallery = (_gallery_unit(numeral, degrees, GALLERY_SEEDS) for degrees, numeral in gallery)
+    return [*settings.STUDY["figures"], *gallery]
 
 
 def _gallery_unit(numeral: str, degrees: int, seeds: int) -> Unit:
@@ -97,7 +80,7 @@ def pair_of(unit: Unit) -> KnownPair:
 
 def _keypoints(unit: Unit) -> Result:
     """Maxima of the heat signature as found, moved off the rims, and grouped."""
-    scan = subject(unit["subject"], unit["azimuth_deg"])
+    scan = subject(unit["subject"], unit.get("azimuth_deg"))
     field = heat_field(scan)
     points = field.front.points
     return {

@@ -118,13 +118,12 @@ def _short(value: float) -> str:
 
 def _keypoints(records: Records, out: Path) -> None:
     """Figure 1: from a scan to its PA-HKS keypoints."""
-    rows = [
-        _keypoint_row(subject(r.unit["subject"], r.unit["azimuth_deg"]), r.result) for r in records
-    ]
-    draw_sheet(rows, out / "fig1-pa-hks.png")
+    draw_sheet([_keypoint_row(record) for record in records], out / "fig1-pa-hks.png")
 
 
-def _keypoint_row(scan: PreparedScan, result: Mapping[str, Any]) -> list[Panel]:
+def _keypoint_row(record: Record) -> list[Panel]:
+    result, shown = record.result, record.unit
+    scan = subject(shown["subject"], shown.get("azimuth_deg"))
     size, radius = (WIDTH // 4, 430), _BALL * scan.diameter
     mesh, pale = _artificial_mesh(heat_field(scan)), colored(scan.mesh, CLAY)
     before, after, grouped = (np.array(result[key]) for key in ("before", "after", "grouped"))

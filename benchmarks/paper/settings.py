@@ -35,6 +35,10 @@ NUM_SWEPT, FIRST_SWEPT = 8, 100
 """Other starts, by number and first seed, by which the tuning is chosen."""
 SWEEP_DEG = 40
 """The tuning is chosen by the hardest starts: from the others nearly all runs converge."""
+REPEATED_DIAMETERS = 0.04
+"""A keypoint is repeated if the other view has one within this distance,"""
+RIGHT_DIAMETERS = 0.06
+"""and a match is right within this one."""
 COARSE_RIGHT = Limit(deg=5.0, percent=2.0)
 """Within this a coarse pose is."""
 
