@@ -69,7 +69,10 @@ def _tuning(change: Mapping[str, Any], used: Mapping[str, Any]) -> Tuning:
 
 STUDY = tomllib.loads(Path(__file__).with_name("study.toml").read_text(encoding="utf-8"))
 QUICK = "quick"
-SETTINGS = {numeral: Setting(**row) for numeral, row in STUDY["settings"].items()}
+SETTINGS = {
+    numeral: Setting(**{**row, "printed": tuple(row.get("printed", (0.0, 0.0)))})
+    for numeral, row in STUDY["settings"].items()
+}
 """The seven by numeral, and one that needs no data."""
 NUMERALS = tuple(numeral for numeral in SETTINGS if numeral != QUICK)
 TUNED: dict[str, Tuning] = {name: _tuning({}, used) for name, used in STUDY["tuned"].items()}
