@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from statistics import mean, median, median_low
+from typing import Any
 
 import numpy as np
 
@@ -154,12 +155,11 @@ def _set(name: str, options: argparse.Namespace) -> list[Json]:
         truth = make_set(SETS[name], 0, folder, data_folder(options.data))
         runs, rivals = [], []
         for _ in range(1 if options.quick else options.runs):
-            runs.append(beside_loop(lambda: run_once(folder, truth)))
+            runs.append(_measured(folder, truth))
             if name == RIVAL_SET:
                 rivals.append(beside_loop(lambda: open3d_once(folder, truth)))
-        two = beside_loop(lambda: run_once(folder, truth, workers=2))
-    both = {key: two[key] for key in ("cpu", "seconds", "load")}
-    ours = {"kind": "set", "name": name, **_median(runs), "two_workers": both}
+        two = _measured(folder, truth, 2)
+    ours = {"kind": "set", "name": name, **_median(runs), "two_workers": _brief(two)}
     return [ours, *({"kind": "open3d", "name": name, **_median(rivals)} for _ in rivals[:1])]
 
 
@@ -174,17 +174,16 @@ def _median(runs: Sequence[Json]) -> Json:
 def many(options: argparse.Namespace) -> Iterator[Json]:
     """More and more virtual scans of one object."""
     for number in () if options.quick else options.many:
-        yield _virtual(number, options)
+        mesh = read_mesh(data_folder(options.data) / "meshes/armadillo.ply")
+        with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
+            folder = Path(temporary) / "scans"
+            poses = simulate(mesh, folder, num_scans=number, pixels=PIXELS).poses
+            scans = [read_scan(path) for path in sorted(folder.glob("*.ply"))]
+            yield {"kind": "many", "name": str(number), **_measured(folder, truth_of(scans, poses))}
 
 
-def _virtual(number: int, options: argparse.Namespace) -> Json:
-    mesh = read_mesh(data_folder(options.data) / "meshes/armadillo.ply")
-    with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
-        folder = Path(temporary) / "scans"
-        poses = simulate(mesh, folder, num_scans=number, pixels=PIXELS).poses
-        truth = truth_of([read_scan(path) for path in sorted(folder.glob("*.ply"))], poses)
-        record = beside_loop(lambda: run_once(folder, truth))
-    return {"kind": "many", "name": str(number), **record}
+def _measured(folder: Path, truth: Truth, *how: Any, **environment: str) -> Json:
+    return beside_loop(lambda: run_once(folder, truth, *how, **environment))
 
 
 def first(options: argparse.Namespace) -> list[Json]:
@@ -193,12 +192,12 @@ def first(options: argparse.Namespace) -> list[Json]:
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         folder, cache = Path(temporary) / "scans", str(Path(temporary) / "kernels")
         truth = make_set(SETS[name], 0, folder, data_folder(options.data))
-        cold, warm = (
-            beside_loop(lambda: run_once(folder, truth, 2, NUMBA_CACHE_DIR=cache)) for _ in range(2)
-        )
-    told = {when: {k: run[k] for k in ("cpu", "seconds", "load")} for when, run in
-            (("cold", cold), ("warm", warm))}  # fmt: skip
-    return [{"kind": "first", "name": name, **told}]
+        cold, warm = (_measured(folder, truth, 2, NUMBA_CACHE_DIR=cache) for _ in range(2))
+    return [{"kind": "first", "name": name, "cold": _brief(cold), "warm": _brief(warm)}]
+
+
+def _brief(run: Json) -> Json:
+    return {key: run[key] for key in ("cpu", "seconds", "load")}
 
 
 def small(options: argparse.Namespace) -> list[Json]:
