@@ -1,13 +1,11 @@
 """Pages that benchmarks write say what their records say."""
 
-import importlib
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from jinja2 import UndefinedError
 
+from benchmarks import pages
 from benchmarks.blocks import BLOCK, TEMPLATES, grid
 from benchmarks.paper import method
 from benchmarks.paper.__main__ import TABLES
@@ -21,25 +19,14 @@ DOCS = ROOT / "docs"
 PAPER = DOCS / "paper"
 
 
-@pytest.fixture
-def pages(monkeypatch: pytest.MonkeyPatch):
-    """The script benchmarks/pages.py, imported from its own folder as scripts are."""
-    folder = ROOT / "benchmarks"
-    monkeypatch.syspath_prepend(str(folder))
-    yield importlib.import_module("pages")
-    for name, module in list(sys.modules.items()):
-        if getattr(module, "__file__", None) and Path(str(module.__file__)).parent == folder:
-            del sys.modules[name]
-
-
 @pytest.mark.parametrize("name", ["../README.md", "benchmarks.md", "model.md"])
-def test_measured_parts_are_those_of_the_results(name: str, pages: ModuleType):
+def test_measured_parts_are_those_of_the_results(name: str):
     text = (DOCS / name).read_text(encoding="utf-8")
     assert BLOCK.findall(text)
-    assert pages.rewritten(text) == text, "run python benchmarks/pages.py"
+    assert pages.rewritten(text) == text, "run python -m benchmarks.pages"
 
 
-def test_every_measured_part_stands_somewhere(pages: ModuleType):
+def test_every_measured_part_stands_somewhere():
     text = "".join(path.read_text(encoding="utf-8") for path in pages.PAGES)
     assert {name for _, name, _ in BLOCK.findall(text)} == set(pages.BLOCKS)
 
