@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.blocks import TEMPLATES
-from benchmarks.paper import ablations, settings, told
+from benchmarks.paper import ablations, settings, summary
 from benchmarks.paper import ablations_search as search
 from benchmarks.results import DATA, read_results
 from benchmarks.scores import Stated
@@ -39,12 +39,12 @@ def method_text(folder: Path, others: Path = DATA) -> str:
 
     names = {"Config": Config, "parts": ablations, "search": search, "study": study, "other": other}
     names |= {"auc": auc, "middle_share": middle_share, "schedules": schedules(1.0)}
-    return TEMPLATES.get_template(TEMPLATE).render(vars(settings) | vars(told) | names)
+    return TEMPLATES.get_template(TEMPLATE).render(vars(settings) | vars(summary) | names)
 
 
-def auc(told: Iterable[Mapping[str, Any]], what: str) -> float:
+def auc(answers: Iterable[Mapping[str, Any]], what: str) -> float:
     """How well a number of the evidence tells right first answers from wrong ones."""
-    each = ((getattr(Evidence(**a["evidence"]), what), a["rank"] == 1) for a in told)
+    each = ((getattr(Evidence(**a["evidence"]), what), a["rank"] == 1) for a in answers)
     return Stated.of(each).auc
 
 

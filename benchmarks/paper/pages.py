@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.blocks import TEMPLATES, rendered
-from benchmarks.paper import methods, pictures, settings, told
+from benchmarks.paper import methods, pictures, settings, summary
 from benchmarks.paper.methods import BY_TITLE, METHODS, missing_modules
 from benchmarks.study.plots import Curve, Panel, draw_panels
 from benchmarks.study.records import Records, answers, by_overlap, grouped, of, values_of
@@ -21,7 +21,7 @@ def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) 
     """Write the page of a table of the study, and the pictures on it; what it says.
 
     The template sees ``records`` and all names of the settings, of the module that measures the
-    table, and of what is told of it.
+    table, and of the summary.
     """
     out.mkdir(parents=True, exist_ok=True)
     DRAW.get(name, lambda records, out: None)(records, out)
@@ -32,7 +32,7 @@ def write_page(name: str, records: Sequence[Record], out: Path, *, quick: bool) 
         "records": records,
     }
     measuring = import_module(f"benchmarks.paper.{name}")
-    values = [vars(pictures), vars(methods), vars(settings), vars(measuring), vars(told), page]
+    values = [vars(pictures), vars(methods), vars(settings), vars(measuring), vars(summary), page]
     text = rendered(f"paper/{name}", **reduce(or_, values)).rstrip() + "\n"
     write_whole(out / f"{name}.md", text.encode())
     return text
@@ -56,23 +56,23 @@ def _draw_table1(records: Records, out: Path) -> None:
     for protocol, chosen in grouped(of(records, noise=0.0), "{protocol}").items():
         gaps = grouped(chosen, "{gap}")
         ticks = {int(gap): gap for gap in gaps}
-        panels.append(Panel(told.STARTS_OF[protocol], ticks, _curves(list(gaps.values()))))
+        panels.append(Panel(summary.STARTS_OF[protocol], ticks, _curves(list(gaps.values()))))
     draw_panels(out / "table1.png", [panels], "gap between the views (°)", "right answers (%)")
 
 
 def _draw_real_pairs(records: Records, out: Path) -> None:
     """Share of pairs in the right basin by overlap."""
-    bins = by_overlap(records, told.BINS[::-1])
+    bins = by_overlap(records, summary.BINS[::-1])
     titles = [f"{title}\n{len(inside)} pairs" for title, inside in bins.items()]
     panel = Panel("", dict(enumerate(titles)), _curves(list(bins.values()), in_basin=True))
-    draw_panels(out / "real_pairs.png", [[panel]], "overlap", f"right answers, {told.BASIN} (%)")
+    draw_panels(out / "real_pairs.png", [[panel]], "overlap", f"right answers, {summary.BASIN} (%)")
 
 
 def _curves(groups: Sequence[Records], *, in_basin: bool = False) -> dict[str, Curve]:
     """A line for each method, over groups of pairs."""
     curves = {}
     for title, method in BY_TITLE.items():
-        limit = told.RIGHT if method in told.REFINED and not in_basin else told.BASIN
+        limit = summary.RIGHT if method in summary.REFINED and not in_basin else summary.BASIN
         shares = [limit.share(answers(group, method)) for group in groups]
         curves[title] = shares, _look(method in ("default", "paper"), METHODS[method].color)
     return curves
@@ -84,13 +84,13 @@ def _look(is_strong: bool, color: str) -> dict[str, object]:
 
 def _draw_basins(records: Records, out: Path) -> None:
     """Share of right answers against the start, a panel for each gap."""
-    starts, methods = records[0].result["answers"], told.from_starts(records)
+    starts, methods = records[0].result["answers"], summary.from_starts(records)
     colors = {name: entry.color for name, entry in METHODS.items()} | {"joint": "#9C6ADE"}
     panels = []
     for title, at_gap in grouped(records, "views {gap}° apart").items():
         curves = {}
         for n, (name, method) in enumerate(methods.items()):
-            each = [told.answers_from(at_gap, start, method) for start in starts]
+            each = [summary.answers_from(at_gap, start, method) for start in starts]
             # Curves that coincide are drawn a hair apart, so that all are seen.
             offset = 0.007 * (n - len(methods) / 2)
             look = _look(method in ("m-icc", "mm-icc", "default"), colors[method])
@@ -112,7 +112,7 @@ def _draw_features(records: Records, out: Path) -> None:
 def _feature_panel(title: str, records: Records, group: str, question: str) -> Panel:
     gaps, curves = values_of(records, "gap"), {}
     for entry in records[0].result[group]:
-        each = [told.pooled(of(records, gap=gap), group, question, entry) for gap in gaps]
+        each = [summary.pooled(of(records, gap=gap), group, question, entry) for gap in gaps]
         right, asked, chance = np.array(each).T
         asked, look = np.where(asked > 0, asked, np.nan), {"color": _COLORS[entry]}
         curves[entry] = right / asked, look

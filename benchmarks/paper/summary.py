@@ -1,4 +1,4 @@
-"""What the pages of the study tell of its records, beside what their templates do."""
+"""What the pages of the study say of its records, beside what their templates do."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, product
@@ -41,9 +41,9 @@ def best_but_default(records: Records, limit: Limit, methods: Iterable[str]) -> 
     return max(tried, key=lambda m: limit.share(pick.answers(records, m)), default=None)
 
 
-def degrees(told: Iterable[Answer]) -> list[float]:
+def degrees(answers: Iterable[Answer]) -> list[float]:
     """Rotation errors; half a turn where there is no answer."""
-    return [180.0 if each["deg"] is None else each["deg"] for each in told]
+    return [180.0 if each["deg"] is None else each["deg"] for each in answers]
 
 
 def noise_title(noise: float) -> str:
