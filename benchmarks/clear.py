@@ -4,8 +4,9 @@ A pair of a quick search is *clear* where its kind is good and its score and mar
 of what a good pair needs. It is held against the truth and against the thorough search.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, product
 
 from benchmarks.calibration.scenes import make_set
@@ -15,14 +16,14 @@ from benchmarks.results import Json
 from benchmarks.virtual.scene import Scene as Truth
 from scanweld.config import Config
 from scanweld.errors import InputError
-from scanweld.evidence.field import ScanField
+from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.quick import CLEAR_MARGIN, CLEAR_SCORE
-from scanweld.pairs.registrar import Edge, PairRegistrar, PairScan, PairTask
+from scanweld.pairs.registrar import PairRegistrar, PairScan, PairTask
 from scanweld.pairs.result import PairKind, PairResult
-from scanweld.pipeline.intake import Intake, take_in
+from scanweld.pipeline.intake import take_in
 from scanweld.pipeline.stages import lay_out
 from scanweld.work.progress import NoCache, silent
 from scanweld.work.stage_log import Stages
@@ -48,69 +49,50 @@ class ClearPairs(Kept):
 
     def measure(self, unit: Unit) -> Result:
         """What both searches say of the pairs, and what is true of it."""
-        truth = make_set(unit["seed"])
         try:
-            return {"pairs": [pair.searched(unit["thorough"]) for pair in pairs_of(truth)]}
+            return {"pairs": list(searched(make_set(unit["seed"]), unit["thorough"]))}
         except InputError:
             return {"pairs": []}
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Pair:
-    """A pair of a set, and all that searching it takes."""
-
-    edge: Edge
-    truth: Truth
-    intake: Intake
-    fields: Sequence[ScanField]
-    registrar: PairRegistrar
-    parts: dict[int, PairScan]  # Of the scans for which something asked for them
-
-    def searched(self, thorough: str) -> Json:
-        """What the quick search says, and of all pairs, or of good ones, the thorough one."""
-        task, fields = PairTask(edge=self.edge), [self.fields[k] for k in self.edge]
-        quick = self.registrar.search_quickly(task, *fields)
-        told = self._told(quick)
-        if thorough == "none" or (thorough == "good" and not told["good"]):
-            return told
-        config = self.registrar.config
-        for k in self.edge:
-            if k not in self.parts:
-                prepared = self.intake.prepared[k]
-                self.parts[k] = self.registrar.scan(prepared, describe(prepared, config.heat))
-        slow = self.registrar.register(task, *(self.parts[k] for k in self.edge))
-        both = [result.best for result in (quick, slow) if result.best is not None]
-        i, j = fields
-        problem = PairProblem(edge=self.edge, i=i, j=j, config=config.pairs)
-        is_same = len(both) == 2 and problem.is_same(*both)
-        return {**told, "thorough": self._told(slow), "same": is_same}
-
-    def _told(self, result: PairResult) -> Json:
-        i, j = (self.intake.prepared[k] for k in self.edge)
-        is_right, best = False, result.best
-        if best is not None:
-            between = i.scan_from_sensor @ best.i_from_j @ j.scan_from_sensor.inverse()
-            is_right = is_right_pair(i.name, j.name, between, self.truth)
-        return {
-            **{"i": i.name, "j": j.name, "good": result.kind is PairKind.GOOD},
-            **{"right": is_right, "margin": result.margin},
-            "score": 0.0 if best is None else best.score,
-        }
-
-
-def pairs_of(truth: Truth) -> list[Pair]:
-    """The pairs of a set.
+def searched(truth: Truth, thorough: str) -> Iterator[Json]:
+    """What the quick search says of a set's pairs, and of all, or of good ones, the thorough one.
 
     Raises:
-        InputError: If fewer than two of its scans are usable.
+        InputError: If fewer than two scans of the set are usable.
     """
     config, stages = Config(), Stages(workers=1, cache=NoCache(), progress=silent)
     intake = take_in(truth.scans, {}, Knowledge(), config, stages)
-    shared = {
-        **{"truth": truth, "intake": intake, "registrar": PairRegistrar(config=config)},
-        **{"fields": lay_out(intake, config, stages).fields, "parts": {}},
+    fields, scans = lay_out(intake, config, stages).fields, intake.prepared
+    registrar = PairRegistrar(config=config)
+
+    @cache
+    def part(k: int) -> PairScan:
+        return registrar.scan(scans[k], describe(scans[k], config.heat))
+
+    for i, j in combinations(range(len(scans)), 2):
+        task = PairTask(edge=(i, j))
+        quick = registrar.search_quickly(task, fields[i], fields[j])
+        told = _told(quick, scans[i], scans[j], truth)
+        if thorough == "all" or (thorough == "good" and told["good"]):
+            slow = registrar.register(task, part(i), part(j))
+            both = [result.best for result in (quick, slow) if result.best is not None]
+            problem = PairProblem(edge=(i, j), i=fields[i], j=fields[j], config=config.pairs)
+            told["thorough"] = _told(slow, scans[i], scans[j], truth)
+            told["same"] = len(both) == 2 and problem.is_same(*both)
+        yield told
+
+
+def _told(result: PairResult, i: PreparedScan, j: PreparedScan, truth: Truth) -> Json:
+    is_right, best = False, result.best
+    if best is not None:
+        between = i.scan_from_sensor @ best.i_from_j @ j.scan_from_sensor.inverse()
+        is_right = is_right_pair(i.name, j.name, between, truth)
+    return {
+        **{"i": i.name, "j": j.name, "good": result.kind is PairKind.GOOD},
+        **{"right": is_right, "margin": result.margin},
+        "score": 0.0 if best is None else best.score,
     }
-    return [Pair(edge=edge, **shared) for edge in combinations(range(len(intake.prepared)), 2)]
 
 
 def over_limits(records: Sequence[Record]) -> Json:

@@ -10,14 +10,17 @@ at 8 is the share of repeated keypoints whose partner is among the 8 nearest sig
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import permutations
 from pathlib import Path
 from statistics import mean
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from benchmarks.blocks import rendered
+from benchmarks.paper.baselines.feature_views import is_seen
 from benchmarks.results import Json, write_results
 from benchmarks.sets import data_folder
 from scanweld.config import HeatConfig, PrepareConfig
@@ -48,6 +51,10 @@ class Seen(NamedTuple):
     features: Features
     seconds: float
 
+    def near(self, points: FloatArray) -> BoolArray:
+        """Which of its M keypoints are near which points (N, 3), sensor frame: (N, M)."""
+        return cdist(points, self.features.points) < RADIUS_DIAMETERS * self.scan.diameter
+
 
 def main() -> None:
     """Measure, and print the table."""
@@ -58,7 +65,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file of all comparisons of two views")
     options = parser.parse_args()
     if options.quick:
-        compared = comparisons("creature", creature(voxels=80), "z", (0,), (30,))
+        compared = list(comparisons("creature", creature(voxels=80), "z", (0,), (30,)))
     else:
         data = data_folder(None) / "meshes"
         paths = options.meshes or [data / "armadillo.ply", data / "bunny.ply"]
@@ -74,18 +81,15 @@ def comparisons(
     up: Axis,
     azimuths_deg: Sequence[float] = AZIMUTHS_DEG,
     gaps_deg: Sequence[float] = GAPS_DEG,
-) -> list[Json]:
+) -> Iterator[Json]:
     """Both directions of all pairs of views of a mesh."""
-    found = []
     for azimuth in azimuths_deg:
         first = look(mesh, azimuth, up)
         for gap in gaps_deg:
             second = look(mesh, azimuth + gap, up)
-            of = {"mesh": name, "azimuth": azimuth, "gap": gap}
-            for i, j in ((first, second), (second, first)):
+            for i, j in permutations((first, second)):
                 cost = {"keypoints": len(j.features.points), "seconds": second.seconds}
-                found.append({**of, **compare(i, j), **cost})
-    return found
+                yield {"mesh": name, "azimuth": azimuth, "gap": gap, **compare(i, j), **cost}
 
 
 def over_views(compared: Sequence[Json]) -> Json:
@@ -112,34 +116,18 @@ def compare(i: Seen, j: Seen) -> dict[str, float | None]:
     """Repeatability of i's keypoints in j and recall at 8, each with its chance level."""
     j_from_i = j.world_from_sensor.inverse() @ i.world_from_sensor
     points, samples = (j_from_i.apply(p) for p in (i.features.points, i.scan.samples.points))
-    samples = samples[_is_seen(samples, j.scan)]
-    is_near = _near(points, j) & _is_seen(points, j.scan)[:, None]
+    seen, samples = is_seen(points, j.scan), samples[is_seen(samples, j.scan)]
+    is_near = j.near(points) & seen[:, None]
     repeated: BoolArray = np.any(is_near, axis=1)
-    apart = np.linalg.norm(i.features.signatures[:, None] - j.features.signatures[None], axis=-1)
+    apart = cdist(i.features.signatures, j.features.signatures)
     among = np.argsort(apart, axis=1, kind="stable")[:, :NEAREST]
     is_found: BoolArray = np.any(np.take_along_axis(is_near, among, axis=1), axis=1)
     return {
-        "repeated": float(repeated.sum() / _is_seen(points, j.scan).sum()),
-        "repeated_chance": float(np.mean(_near(samples, j).any(axis=1))),
+        "repeated": float(repeated.sum() / seen.sum()),
+        "repeated_chance": float(np.mean(j.near(samples).any(axis=1))),
         "recall": float(np.mean(is_found[repeated])) if repeated.any() else None,
         "recall_chance": NEAREST / len(j.features.points),
     }
-
-
-def _near(points: FloatArray, seen: Seen) -> BoolArray:
-    """Which of a view's M keypoints are near which points (N, 3), sensor frame: (N, M)."""
-    away = np.linalg.norm(points[:, None] - seen.features.points[None], axis=-1)
-    return away < RADIUS_DIAMETERS * seen.scan.diameter
-
-
-def _is_seen(points: FloatArray, scan: PreparedScan) -> BoolArray:
-    """Which points (N, 3), sensor frame, lie on the surface that the scan shows."""
-    pixels, depth = scan.image.camera.project(points)
-    columns, rows = np.rint(pixels).astype(int).T
-    height, width = scan.image.depth.shape
-    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-    shown = scan.image.depth[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
-    return inside & (np.abs(shown - depth) < 4 * scan.image.pixel)
 
 
 if __name__ == "__main__":

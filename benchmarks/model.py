@@ -29,7 +29,7 @@ import numpy as np
 from benchmarks.blocks import rendered
 from benchmarks.results import Json, write_results
 from benchmarks.run import timed
-from benchmarks.sets import BUNNY, data_folder
+from benchmarks.sets import OBJECTS, data_folder
 from benchmarks.surface.subject import RIVALS, Subject, compared, fidelity, seen_of
 from benchmarks.surface.surface_distances import sample_surface
 from scanweld.config import Config, FusionConfig
@@ -133,7 +133,7 @@ def virtual(options: argparse.Namespace) -> list[Json]:
 def real(options: argparse.Namespace) -> list[Json]:
     """The bunny's ten scans."""
     folder = data_folder(options.data) / "stanford-bunny"
-    scans = [read_scan(folder / f"{name}.ply") for name in BUNNY]
+    scans = [read_scan(folder / f"{name}.ply") for name in OBJECTS["bunny"].scans]
     reference = read_mesh(folder / "bun_zipper.ply")
     prepared = [prepare(scan, Config().prepare) for scan in scans]
     truth, num_samples = read_poses(folder / "poses.json").poses, Size().num_samples

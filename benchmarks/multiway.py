@@ -13,6 +13,7 @@ import time
 from itertools import combinations
 from pathlib import Path
 from statistics import median
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from benchmarks.paper.baselines import fpfh
 from benchmarks.results import write_file
 from benchmarks.study.optional import need
 from scanweld.errors import InputError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.scan import principal_diameter
 from scanweld.io import read_scan
 
@@ -39,7 +41,7 @@ def main() -> int:
     return 0
 
 
-def multiway(o3d: Any, folder: Path) -> dict[str, Any]:
+def multiway(o3d: ModuleType, folder: Path) -> dict[str, Any]:
     """Poses of all scans of a folder, and what they cost."""
     o3d.utility.random.seed(0)
     scans = [read_scan(path) for path in sorted(folder.glob("*.ply"))]
@@ -84,38 +86,20 @@ def multiway(o3d: Any, folder: Path) -> dict[str, Any]:
     return {"cpu": time.process_time() - start, "poses": poses}
 
 
-def _described(o3d: Any, points: Any, voxel: float) -> tuple[Any, Any]:
+def _described(o3d: ModuleType, points: FloatArray, voxel: float) -> fpfh.Described:
     """A thinned cloud with normals, and its features."""
-    near = o3d.geometry.KDTreeSearchParamHybrid
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.array(points))).voxel_down_sample(
-        voxel
-    )
-    cloud.estimate_normals(near(radius=fpfh.NORMAL_VOXELS * voxel, max_nn=30))
+    cloud = fpfh.thinned(o3d, points, voxel)
     cloud.orient_normals_to_align_with_direction([0.0, 0.0, 1.0])  # the sensors look along -z
-    around = near(radius=fpfh.FEATURE_VOXELS * voxel, max_nn=100)
-    return cloud, o3d.pipelines.registration.compute_fpfh_feature(cloud, around)
+    return cloud, fpfh.features(o3d, cloud, voxel)
 
 
-def _pairwise(o3d: Any, i: Any, j: Any, reach: float) -> tuple[Any, Any]:
+def _pairwise(
+    o3d: ModuleType, i: fpfh.Described, j: fpfh.Described, reach: float
+) -> tuple[FloatArray, FloatArray]:
     """j_from_i by FPFH, RANSAC and ICP, and its information."""
-    registration = o3d.pipelines.registration
-    found = registration.registration_ransac_based_on_feature_matching(
-        *(i[0], j[0], i[1], j[1]),
-        mutual_filter=True,
-        max_correspondence_distance=reach,
-        estimation_method=registration.TransformationEstimationPointToPoint(False),
-        ransac_n=3,
-        checkers=[
-            registration.CorrespondenceCheckerBasedOnEdgeLength(fpfh.EDGE_RATIO),
-            registration.CorrespondenceCheckerBasedOnDistance(reach),
-        ],
-        criteria=registration.RANSACConvergenceCriteria(fpfh.NUM_ITERATIONS, fpfh.CONFIDENCE),
-    )
-    plane = registration.TransformationEstimationPointToPlane()
-    close = registration.registration_icp(i[0], j[0], reach, found.transformation, plane)
-    return close.transformation, registration.get_information_matrix_from_point_clouds(
-        i[0], j[0], reach, close.transformation
-    )
+    matrix = fpfh.icp(o3d, j[0], i[0], reach, fpfh.ransac(o3d, j, i, reach)).transformation
+    information = o3d.pipelines.registration.get_information_matrix_from_point_clouds
+    return matrix, information(i[0], j[0], reach, matrix)
 
 
 if __name__ == "__main__":

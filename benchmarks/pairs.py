@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise, product
 from pathlib import Path
-from statistics import mean
 
 import numpy as np
 
@@ -26,23 +25,23 @@ from benchmarks.blocks import rendered
 from benchmarks.results import Json, write_results
 from benchmarks.scores import Stated
 from benchmarks.sets import OBJECTS, PairSet, data_folder, made_pairs, moved_scans, real_pairs
+from benchmarks.study.plots import save, subplots
 from scanweld.config import Config, PairsConfig
 from scanweld.evaluation.metrics import MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT, object_diameter
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
 from scanweld.pairs.registrar import PairRegistrar, PairScan, PairTask
-from scanweld.pairs.result import PairKind, PairResult
+from scanweld.pairs.result import PairResult
 from scanweld.preparation.prepare import prepare
 from scanweld.work.threads import map_in_order, single_threaded_algebra
 
 KEYPOINTS = ("mixed", "heat", "even")
-NEAR_ROTATION_DEG, NEAR_TRANSLATION_PERCENT = 10.0, 5.0
+NEAR = {"rotation_deg": 10.0, "translation_percent": 5.0}
+"""Most of the errors of an answer that is at least in the right basin."""
 FLOORS = {(0.15, 1.01): 0.95, (0.10, 0.15): 0.80, (0.05, 0.10): None, (0.0, 0.05): None}
 """Share of first answers that must be right, by overlap."""
 MIN_AUC = 0.97
-WIDE, THIN = (0.10, np.inf), (0.05, 0.10)
-"""Overlaps of the pairs that pages tell of in words."""
 
 
 def main() -> int:
@@ -133,61 +132,25 @@ def _told(result: PairResult, errors: Sequence[tuple[float, float]]) -> Json:
 
 
 def over_pairs(answers: Sequence[Json]) -> Json:
-    """Shares and medians by anchors and overlap, and by anchors alone."""
+    """The answers by anchors, and by anchors and overlap with their floors; how scores tell."""
     kinds = {
-        k: [a for a in answers if a["anchors"] == k] for k in {a["anchors"]: 0 for a in answers}
+        kind: [answer for answer in answers if answer["anchors"] == kind]
+        for kind in dict.fromkeys(answer["anchors"] for answer in answers)
     }
     bins = [
-        {"anchors": kind, "low": low, "high": high, **_in_bin(inside, floor)}
+        {"anchors": kind, "low": low, "high": high, "floor": floor, "answers": inside}
         for kind, of in kinds.items()
         for (low, high), floor in FLOORS.items()
         if (inside := [a for a in of if low <= a["overlap"] < high])
     ]
-    in_all = {kind: _in_all(of) for kind, of in kinds.items()}
-    stated = {
-        kind: Stated.of((a["score"], a["rank"] == 1) for a in of if a["score"] is not None)
+    for each in bins:
+        share = float(np.mean([a["rank"] == 1 for a in each["answers"]]))
+        each |= {"share": share, "is_met": each["floor"] is None or share >= each["floor"]}
+    areas = {
+        kind: Stated.of((a["score"], a["rank"] == 1) for a in of if a["score"] is not None).auc
         for kind, of in kinds.items()
     }
-    areas = {kind: of.auc for kind, of in stated.items()}
-    return {"bins": bins, "aucs": areas, "min_auc": MIN_AUC, "in_all": in_all}
-
-
-def _in_bin(answers: Sequence[Json], floor: float | None) -> Json:
-    right = [a for a in answers if a["rank"] == 1]
-    accepted = [a for a in answers if a["kind"] == PairKind.GOOD]
-    errors = {key: [a[key] for a in right] for key in ("rotation_deg", "translation_percent")}
-    return {
-        "count": len(answers),
-        "right": len(right) / len(answers),
-        "floor": floor,
-        "is_met": floor is None or len(right) / len(answers) >= floor,
-        "near": np.mean([_is_near(a) for a in answers]),
-        "kept": np.mean([a["rank"] is not None for a in answers]),
-        "accepted": len(accepted),
-        "wrong": sum(a["rank"] != 1 for a in accepted),
-        **{key: np.median(values) if values else None for key, values in errors.items()},
-        "seconds": np.mean([a["seconds"] for a in answers]),
-    }
-
-
-def _in_all(answers: Sequence[Json]) -> Json:
-    ranks = {
-        name: [a["rank"] for a in answers if low <= a["overlap"] < high]
-        for name, (low, high) in {"wide": WIDE, "thin": THIN}.items()
-    }
-    return {
-        **{name: f"{of.count(1)} of {len(of)}" for name, of in ranks.items()},
-        "count": len(answers),
-        "wrong": sum(a["kind"] == PairKind.GOOD and a["rank"] != 1 for a in answers),
-        "seconds": mean(a["seconds"] for a in answers),
-    }
-
-
-def _is_near(answer: Json) -> bool:
-    """Whether the first answer is at least in the right basin."""
-    rotation, translation = answer["rotation_deg"], answer["translation_percent"]
-    is_turned_so = rotation is not None and rotation <= NEAR_ROTATION_DEG
-    return is_turned_so and translation <= NEAR_TRANSLATION_PERCENT
+    return {"bins": bins, "aucs": areas, "min_auc": MIN_AUC, "in_all": kinds, "near": NEAR}
 
 
 def are_floors_met(answers: Sequence[Json]) -> bool:
@@ -199,12 +162,7 @@ def are_floors_met(answers: Sequence[Json]) -> bool:
 
 def plot(answers: Sequence[Json], path: Path) -> None:
     """Score against overlap, right and wrong, and the share of right answers by overlap."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.2))
+    figure, (left, right) = subplots(1, 2, figsize=(11, 4.2))
     given = [a for a in answers if a["score"] is not None]
     for is_right, color, label in ((False, "#c0392b", "wrong"), (True, "#2471a3", "right")):
         chosen = [a for a in given if (a["rank"] == 1) is is_right]
@@ -223,9 +181,7 @@ def plot(answers: Sequence[Json], path: Path) -> None:
     right.set_xticks(places, [f"{a:g}\n–{b:g}" for a, b in pairwise(edges)])
     right.set(xlabel="overlap (above the bars: pairs)", ylabel="right as first answer")
     right.set_ylim(0, 1.1)
-    figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    save(figure, path)
 
 
 if __name__ == "__main__":

@@ -21,13 +21,14 @@ DATA = DOCS / "data"
 Json = dict[str, Any]
 
 
-def write_results(path: Path, records: Sequence[Json]) -> None:
-    """Write records, floats to a few significant digits, beside how they came about."""
+def write_results(path: Path, records: Sequence[Json], **more: str) -> None:
+    """Write records, floats to a few significant digits, beside how they came about, and more."""
     head = {
         **{"format": 2, "command": command_line(f"benchmarks.{Path(sys.argv[0]).stem}")},
         **{"commit": commit(), "version": version("scanweld"), "machine": machine()},
+        **more,
     }
-    lines = ",\n".join(json.dumps(rounded(record, 6)) for record in records)
+    lines = ",\n".join(json.dumps(rounded(record, 6), separators=(",", ":")) for record in records)
     write_file(path, f'{json.dumps(head, indent=1)[:-2]},\n "records": [\n{lines}\n]}}\n')
 
 

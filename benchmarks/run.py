@@ -26,11 +26,9 @@ from typing import NamedTuple
 from benchmarks.blocks import rendered
 from benchmarks.kept import warn_of_old_calibration
 from benchmarks.results import Json, write_results
-from benchmarks.sets import QUICK, SETS, data_folder, make_set
-from scanweld.evaluation.metrics import Standing, evaluate_poses
+from benchmarks.sets import QUICK, SETS, Truth, data_folder, make_set
+from scanweld.evaluation.metrics import PoseErrors, Standing, evaluate_poses
 from scanweld.io import PoseSet, read_poses
-
-ALL = {**SETS, **QUICK}
 
 
 class Column(NamedTuple):
@@ -57,7 +55,7 @@ def main() -> int:
     """Run the sets; 0 if all floors are met, else 1."""
     parser = argparse.ArgumentParser(description="Run the main job on sets of scans.")
     add = parser.add_argument
-    add("--sets", nargs="+", choices=list(ALL), default=list(SETS), metavar="SET")
+    add("--sets", nargs="+", choices=SETS, default=[n for n in SETS if n != QUICK], metavar="SET")
     add("--seeds", type=int, default=3, help="number of orders, names and frames")
     add("--quick", action="store_true", help="one small set that needs no data")
     add("--workers", type=int, default=2)
@@ -68,7 +66,7 @@ def main() -> int:
     add("extra", nargs="*", help="further options of scanweld run, after --")
     options = parser.parse_args()
     warn_of_old_calibration()
-    names, seeds = (list(QUICK), 1) if options.quick else (options.sets, options.seeds)
+    names, seeds = ([QUICK], 1) if options.quick else (options.sets, options.seeds)
     runs: list[Json] = []
     for name in names:
         for seed in range(seeds):
@@ -78,18 +76,15 @@ def main() -> int:
             if options.out:
                 write_results(options.out, runs)
     print(rendered("sets", **over_seeds(runs)), end="")
-    return 0 if all(ALL[run["set"]].is_met(run) for run in runs) else 1
+    return 0 if all(SETS[run["set"]].is_met(run) for run in runs) else 1
 
 
 def run_set(name: str, seed: int, options: argparse.Namespace) -> Json:
     """Make a set, run the command on it in a process of its own, and evaluate its poses."""
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         folder, out = Path(temporary) / "scans", Path(temporary) / "model"
-        truth = make_set(ALL[name], seed, folder, data_folder(options.data))
-        # The command that is installed beside this Python, else the one on the path.
-        beside = Path(sys.executable).with_name("scanweld")
-        scanweld = str(beside) if beside.exists() else "scanweld"
-        command = [scanweld, "run", str(folder), "-o", str(out), *options.extra]
+        truth = make_set(SETS[name], seed, folder, data_folder(options.data))
+        command = scanweld_command("run", folder, "-o", out, *options.extra)
         environment = dict(os.environ)
         if options.cold:
             environment["NUMBA_CACHE_DIR"] = str(Path(temporary) / "compiled")
@@ -100,7 +95,7 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> Json:
             report = json.loads((out / "report.json").read_text(encoding="utf-8"))
         if options.keep and out.exists():
             shutil.copytree(out, options.keep / f"{name}-{seed}", dirs_exist_ok=True)
-    errors = evaluate_poses(found, truth.poses, centroids=truth.centroids, diameter=truth.diameter)
+    errors = evaluated(found, truth)
     measured = {"rotation": errors.rotations_deg, "translation": errors.translations_percent}
     return {
         **{"set": name, "seed": seed, "verdict": report.get("verdict", "error")},
@@ -120,6 +115,17 @@ def run_set(name: str, seed: int, options: argparse.Namespace) -> Json:
             if error.standing is not Standing.UNPLACED
         },
     }
+
+
+def scanweld_command(*words: object) -> list[str]:
+    """The command that is installed beside this Python, else the one on the path."""
+    beside = Path(sys.executable).with_name("scanweld")
+    return [str(beside) if beside.exists() else "scanweld", *map(str, words)]
+
+
+def evaluated(found: PoseSet, truth: Truth) -> PoseErrors:
+    """What became of the scans of a made set."""
+    return evaluate_poses(found, truth.poses, centroids=truth.centroids, diameter=truth.diameter)
 
 
 def timed(command: list[str], environment: dict[str, str]) -> dict[str, float]:
@@ -150,7 +156,7 @@ def over_seeds(runs: Sequence[Json]) -> Json:
 def _over_seeds(name: str, runs: Sequence[Json]) -> Json:
     known = {c: [run[c.key] for run in runs if run[c.key] is not None] for c in COLUMNS}
     return {
-        **{"name": name, "wanted": ALL[name], "runs": len(runs)},
+        **{"name": name, "wanted": SETS[name], "runs": len(runs)},
         **{"right": min(run["right"] for run in runs), "wrong": max(run["wrong"] for run in runs)},
         **{c.key: c.together(values) if values else None for c, values in known.items()},
         "verdicts": sorted({run["verdict"] for run in runs}),

@@ -2,7 +2,8 @@
 
 import csv
 import os
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -21,27 +22,16 @@ from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.io import read_poses, read_scan, write_scan_ply
 
 DEFAULT_DATA = Path(__file__).parents[1] / ".." / "shared" / "data"
-BUNNY = (
-    *("bun000", "bun045", "bun090", "bun180", "bun270", "bun315"),
-    *("top2", "top3", "chin", "ear_back"),
-)
-
-
-def dragon(step_deg: int) -> tuple[str, ...]:
-    """Names of the dragon's scans at even steps of the turntable."""
-    return tuple(f"dragonStandRight_{a}" for a in range(0, 360, step_deg))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class BenchmarkSet:
-    """Scans of one object that are put together in one run."""
+    """Scans of one object that are put together in one run, as sets.toml describes them."""
 
     folder: str = ""  # Of the data, with a poses.json; empty for the simulated creature
     scans: tuple[str, ...] = ()  # Names of the scans in that folder
     any_rotation: bool = False  # Whether files are turned not only about their viewing axis
-    # Most that each value of a run may be, by its name; errors are in degrees and in percent of the
-    # object's diameter. All scans have to be right.
-    floors: Mapping[str, float]
+    floors: Mapping[str, float]  # Most that each value of a run may be, by its name
     num_simulated: int = 10  # Scans of the creature
     pixels: float = 300.0  # and their pixels across it
 
@@ -56,43 +46,23 @@ class BenchmarkSet:
         return run["right"] >= self.num_scans and run["wrong"] == 0 and within
 
 
-def _floors(rotation: tuple[float, float], translation: tuple[float, float], **more: float):
-    """Mean and largest errors, and what else is limited."""
-    errors = {"rotation_mean": rotation[0], "rotation_max": rotation[1]}
-    return {**errors, "translation_mean": translation[0], "translation_max": translation[1], **more}
+def _benchmark_set(row: dict[str, Any]) -> BenchmarkSet:
+    step = row.pop("step_deg", 0)
+    scans = [f"dragonStandRight_{a}" for a in range(0, 360, step)] if step else row.pop("scans", ())
+    floors = row.pop("floors")
+    for error in ("rotation", "translation"):
+        floors[f"{error}_mean"], floors[f"{error}_max"] = floors.pop(error)
+    return BenchmarkSet(scans=tuple(scans), floors=floors, **row)
 
 
-_WIDE_STEPS = _floors((0.5, 1.0), (0.5, 1.0))
-_BUNNY = BenchmarkSet(
-    folder="stanford-bunny",
-    scans=BUNNY,
-    floors=_floors((0.15, 0.4), (0.15, 0.4), seconds=45, peak_mb=2000),
-)
-_DRAGON = BenchmarkSet(
-    folder="stanford-dragon",
-    scans=dragon(24),
-    floors=_floors((0.15, 0.3), (0.15, 0.4), seconds=90),
-)
-SETS: Mapping[str, BenchmarkSet] = {
-    "bunny10": _BUNNY,
-    "bunny4": replace(_BUNNY, scans=("bun000", "bun090", "bun180", "bun270"), floors=_WIDE_STEPS),
-    "dragon15": _DRAGON,
-    "dragon5": replace(_DRAGON, scans=dragon(72), floors=_WIDE_STEPS),
-    "dragon8": replace(_DRAGON, scans=dragon(48), floors=_floors((0.3, 0.8), (0.5, 1.0))),
-    "demo": BenchmarkSet(floors=_floors((0.2, 0.5), (0.15, 0.4))),
-    "bunny10-rotated": replace(_BUNNY, any_rotation=True),
-}
-QUICK: Mapping[str, BenchmarkSet] = {
-    "quick": BenchmarkSet(floors=_floors((1.0, 2.0), (1.0, 2.0)), num_simulated=5, pixels=120.0)
-}
-"""Needs no data."""
-
-
-OBJECTS = {
-    "bunny": ("stanford-bunny", BUNNY, 360.0),
-    "dragon": ("stanford-dragon", dragon(24), 97.0),
-}
-"""Object -> folder, scans, largest rotation between the scans of a pair in degrees."""
+_ROWS = tomllib.loads(Path(__file__).with_name("sets.toml").read_text(encoding="utf-8"))
+SETS: Mapping[str, BenchmarkSet] = {name: _benchmark_set(row) for name, row in _ROWS.items()}
+QUICK = "quick"
+"""The set that needs no data."""
+OBJECTS = {"bunny": SETS["bunny10"], "dragon": SETS["dragon15"]}
+"""Whose pairs are registered alone,"""
+MAX_GAP_DEG = {"bunny": 360.0, "dragon": 97.0}
+"""if there is no more than this between two scans."""
 
 
 class Truth(NamedTuple):
@@ -131,6 +101,13 @@ def make_set(wanted: BenchmarkSet, seed: int, out_dir: Path, data: Path) -> Trut
         out_dir.mkdir(parents=True, exist_ok=True)
         for scan in scans:
             write_scan_ply(out_dir / f"{scan.name}.ply", scan)
+    return truth_of(scans, poses, originals)
+
+
+def truth_of(
+    scans: Sequence[RangeScan], poses: Mapping[str, Pose], originals: Mapping[str, str] = {}
+) -> Truth:
+    """What scans with these poses are held against."""
     return Truth(poses, originals, scan_centroids(scans), object_diameter(scans, poses))
 
 
@@ -177,19 +154,28 @@ class PairSet(NamedTuple):
     pairs: Mapping[tuple[str, str], tuple[float, float]]  # Overlap, and rotation in degrees
 
 
+def overlaps_of(folder: Path) -> list[dict[str, Any]]:
+    """The pairs of the scans in a folder: names "i" and "j", "overlap", "gap" in degrees."""
+    with (folder / "overlaps.csv").open(encoding="utf-8") as file:
+        return [
+            {
+                **{"i": row["i"], "j": row["j"], "gap": float(row["rotation_deg"])},
+                "overlap": min(float(row["overlap_ij"]), float(row["overlap_ji"])),
+            }
+            for row in csv.DictReader(file)
+        ]
+
+
 def real_pairs(name: str, data: Path) -> PairSet:
     """Of an object of the data."""
-    folder, names, max_gap_deg = OBJECTS[name]
-    with (data / folder / "overlaps.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    pairs = {
-        (row["i"], row["j"]): (min(float(row["overlap_ij"]), float(row["overlap_ji"])), gap)
-        for row in rows
-        if (gap := float(row["rotation_deg"])) <= max_gap_deg
-    }
-    scans = [read_scan(data / folder / f"{name}.ply") for name in names]
-    poses = read_poses(data / folder / "poses.json").poses
-    return PairSet(name=name, scans=scans, world_from_scan=poses, pairs=pairs)
+    folder = data / OBJECTS[name].folder
+    rows = [row for row in overlaps_of(folder) if row["gap"] <= MAX_GAP_DEG[name]]
+    return PairSet(
+        name=name,
+        scans=[read_scan(folder / f"{name}.ply") for name in OBJECTS[name].scans],
+        world_from_scan=read_poses(folder / "poses.json").poses,
+        pairs={(row["i"], row["j"]): (row["overlap"], row["gap"]) for row in rows},
+    )
 
 
 def made_pairs() -> PairSet:

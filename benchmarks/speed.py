@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from statistics import mean, median, median_low
+from typing import Any
 
 import numpy as np
 
@@ -26,20 +27,15 @@ from benchmarks.blocks import rendered
 from benchmarks.clear import ClearPairs, over_limits
 from benchmarks.kept import COLLECTED, add_options, measured, study
 from benchmarks.results import Json, how_measured, read_results, write_file, write_results
-from benchmarks.run import ALL, timed
-from benchmarks.sets import Truth, data_folder, make_set
-from benchmarks.study.optional import need
-from scanweld.evaluation.metrics import (
-    Standing,
-    evaluate_poses,
-    object_diameter,
-    scan_centroids,
-)
+from benchmarks.run import evaluated, scanweld_command, timed
+from benchmarks.sets import SETS, Truth, data_folder, make_set, truth_of
+from benchmarks.study.plots import GRID, save, subplots
+from scanweld.evaluation.metrics import Standing
 from scanweld.evaluation.simulate import simulate
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, read_mesh, read_poses, read_scan
 
-SETS, RIVAL_SET = ("bunny10", "dragon15", "demo"), "bunny10"
+MEASURED, RIVAL_SET = ("bunny10", "dragon15", "demo"), "bunny10"
 MANY, PIXELS, FIRST_OF_LARGE = (10, 20, 40, 80, 200), 300.0, 40
 """Numbers of virtual scans, their pixels, and from how many on the exponents of stages are."""
 NUM_LOOPS = 320
@@ -100,7 +96,7 @@ def run_once(folder: Path, truth: Truth, workers: int = 1, **environment: str) -
     """Run the main job on a folder of scans: CPU of its stages, memory, counts and errors."""
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         out = Path(temporary) / "model"
-        command = _scanweld("run", folder, "-o", out, "--workers", workers, "--json")
+        command = scanweld_command("run", folder, "-o", out, "--workers", workers, "--json")
         start = time.perf_counter()
         process = subprocess.Popen(
             command, env={**os.environ, **environment}, stdout=subprocess.PIPE, text=True
@@ -133,12 +129,6 @@ def run_once(folder: Path, truth: Truth, workers: int = 1, **environment: str) -
     }
 
 
-def _scanweld(*words: object) -> list[str]:
-    """The command that is installed beside this Python, else the one on the path."""
-    beside = Path(sys.executable).with_name("scanweld")
-    return [str(beside) if beside.exists() else "scanweld", *map(str, words)]
-
-
 def _spent(pid: int) -> tuple[float, float]:
     """CPU seconds and peak megabytes of a process so far, as Linux tells."""
     process = Path(f"/proc/{pid}")
@@ -149,28 +139,27 @@ def _spent(pid: int) -> tuple[float, float]:
 
 
 def _standings(found: PoseSet, truth: Truth) -> Json:
-    errors = evaluate_poses(found, truth.poses, centroids=truth.centroids, diameter=truth.diameter)
+    errors = evaluated(found, truth)
     return {str(s): errors.count(s) for s in (Standing.RIGHT, Standing.WRONG)}
 
 
 def sets(options: argparse.Namespace) -> Iterator[Json]:
     """Whole runs, by one and by two threads, and Open3D in turn with them on one set."""
-    for name in ["quick"] if options.quick else SETS:
+    for name in ["quick"] if options.quick else MEASURED:
         yield from _set(name, options)
 
 
 def _set(name: str, options: argparse.Namespace) -> list[Json]:
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         folder = Path(temporary) / "scans"
-        truth = make_set(ALL[name], 0, folder, data_folder(options.data))
+        truth = make_set(SETS[name], 0, folder, data_folder(options.data))
         runs, rivals = [], []
         for _ in range(1 if options.quick else options.runs):
-            runs.append(beside_loop(lambda: run_once(folder, truth)))
+            runs.append(_measured(folder, truth))
             if name == RIVAL_SET:
                 rivals.append(beside_loop(lambda: open3d_once(folder, truth)))
-        two = beside_loop(lambda: run_once(folder, truth, workers=2))
-    both = {key: two[key] for key in ("cpu", "seconds", "load")}
-    ours = {"kind": "set", "name": name, **_median(runs), "two_workers": both}
+        two = _measured(folder, truth, 2)
+    ours = {"kind": "set", "name": name, **_median(runs), "two_workers": _brief(two)}
     return [ours, *({"kind": "open3d", "name": name, **_median(rivals)} for _ in rivals[:1])]
 
 
@@ -185,18 +174,16 @@ def _median(runs: Sequence[Json]) -> Json:
 def many(options: argparse.Namespace) -> Iterator[Json]:
     """More and more virtual scans of one object."""
     for number in () if options.quick else options.many:
-        yield _virtual(number, options)
+        mesh = read_mesh(data_folder(options.data) / "meshes/armadillo.ply")
+        with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
+            folder = Path(temporary) / "scans"
+            poses = simulate(mesh, folder, num_scans=number, pixels=PIXELS).poses
+            scans = [read_scan(path) for path in sorted(folder.glob("*.ply"))]
+            yield {"kind": "many", "name": str(number), **_measured(folder, truth_of(scans, poses))}
 
 
-def _virtual(number: int, options: argparse.Namespace) -> Json:
-    mesh = read_mesh(data_folder(options.data) / "meshes/armadillo.ply")
-    with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
-        folder = Path(temporary) / "scans"
-        poses = simulate(mesh, folder, num_scans=number, pixels=PIXELS).poses
-        scans = [read_scan(path) for path in sorted(folder.glob("*.ply"))]
-        truth = Truth(poses, {}, scan_centroids(scans), object_diameter(scans, poses))
-        record = beside_loop(lambda: run_once(folder, truth))
-    return {"kind": "many", "name": str(number), **record}
+def _measured(folder: Path, truth: Truth, *how: Any, **environment: str) -> Json:
+    return beside_loop(lambda: run_once(folder, truth, *how, **environment))
 
 
 def first(options: argparse.Namespace) -> list[Json]:
@@ -204,13 +191,13 @@ def first(options: argparse.Namespace) -> list[Json]:
     name = "quick" if options.quick else "demo"
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         folder, cache = Path(temporary) / "scans", str(Path(temporary) / "kernels")
-        truth = make_set(ALL[name], 0, folder, data_folder(options.data))
-        cold, warm = (
-            beside_loop(lambda: run_once(folder, truth, 2, NUMBA_CACHE_DIR=cache)) for _ in range(2)
-        )
-    told = {when: {k: run[k] for k in ("cpu", "seconds", "load")} for when, run in
-            (("cold", cold), ("warm", warm))}  # fmt: skip
-    return [{"kind": "first", "name": name, **told}]
+        truth = make_set(SETS[name], 0, folder, data_folder(options.data))
+        cold, warm = (_measured(folder, truth, 2, NUMBA_CACHE_DIR=cache) for _ in range(2))
+    return [{"kind": "first", "name": name, "cold": _brief(cold), "warm": _brief(warm)}]
+
+
+def _brief(run: Json) -> Json:
+    return {key: run[key] for key in ("cpu", "seconds", "load")}
 
 
 def small(options: argparse.Namespace) -> list[Json]:
@@ -218,10 +205,12 @@ def small(options: argparse.Namespace) -> list[Json]:
     records = []
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
         name = "quick" if options.quick else RIVAL_SET
-        make_set(ALL[name], 0, Path(temporary), data_folder(options.data))
+        make_set(SETS[name], 0, Path(temporary), data_folder(options.data))
         one = next(iter(sorted(Path(temporary).glob("*.ply"))))
         for name, words in {"help": ("--help",), "info": ("info", one)}.items():
-            runs = [timed(_scanweld(*words), dict(os.environ)) for _ in range(NUM_SMALL + 1)][1:]
+            runs = [
+                timed(scanweld_command(*words), dict(os.environ)) for _ in range(NUM_SMALL + 1)
+            ][1:]
             told = {key: median(run[key] for run in runs) for key in ("seconds", "cpu_seconds")}
             told["load"] = os.getloadavg()[0]
             records.append({"kind": "small", "name": name, **told})
@@ -284,9 +273,7 @@ def plot(records: Sequence[Json], path: Path) -> None:
     virtual = sorted((r for r in records if r["kind"] == "many"), key=lambda r: r["scans"])
     if not virtual:
         return
-    need("matplotlib").use("Agg")
-    pyplot = need("matplotlib.pyplot")
-    figure, axes = pyplot.subplots(figsize=(7, 4.6))
+    figure, axes = subplots(figsize=(7, 4.6))
     numbers = [record["scans"] for record in virtual]
     for name in dict.fromkeys(stage for record in virtual for stage in record["stages"]):
         costs = [max(r["stages"].get(name, 0.0), 1e-3) / r["loop"] for r in virtual]
@@ -294,11 +281,9 @@ def plot(records: Sequence[Json], path: Path) -> None:
     axes.loglog(numbers, [r["cpu"] / r["loop"] for r in virtual], "k-o", lw=2.5, label="whole")
     axes.set(xlabel="virtual scans", ylabel="CPU, in fixed loops", ylim=(0.05, None))
     axes.set_xticks(numbers, [str(number) for number in numbers], minor=False)
-    axes.grid(color="#E4E6EA", lw=0.8)
+    axes.grid(**GRID)
     axes.legend(bbox_to_anchor=(1.02, 1.0), loc="upper left", frameon=False, fontsize=8)
-    figure.tight_layout()
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    pyplot.close(figure)
+    save(figure, path, metadata={"Software": None})
 
 
 if __name__ == "__main__":

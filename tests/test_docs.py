@@ -7,7 +7,7 @@ from urllib.parse import unquote
 import pytest
 
 import scanweld
-from benchmarks.study.pages import CONSTANT, constant
+from benchmarks.blocks import CONSTANT, constant
 from scanweld.config import Config
 from scanweld.evidence import rivals
 from scanweld.evidence.evidence import (

@@ -2,8 +2,9 @@
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from trimesh.creation import icosphere
@@ -67,8 +68,7 @@ def balls(points: FloatArray, radius: float, color: str) -> TriangleMesh:
     return colored(mesh, color)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Look:
+class Look(NamedTuple):
     """Where a picture is taken from: x right, y down. Its camera is finer than the picture."""
 
     picture_from_world: Pose
@@ -134,8 +134,8 @@ def render(meshes: Sequence[TriangleMesh], look: Look) -> ByteArray:
     corners = faces[face_of[seen]]
     shares = _barycentric(points[corners], look.camera.unproject_image(depth)[seen])
     flat = _unit(face_normals(points, corners))
-    smooth = _mixed(shares, turned[corners])
-    color = _mixed(shares, colors[corners])
+    smooth = np.einsum("nk,nkc->nc", shares, turned[corners])
+    color = np.einsum("nk,nkc->nc", shares, colors[corners])
     inside = _INSIDE_LIGHT * (color + _INSIDE_GREY * (color.mean(axis=1, keepdims=True) - color))
     picture = np.broadcast_to(rgb(PAPER), (*depth.shape, 3)).copy()
     picture[seen] = _lit(
@@ -145,10 +145,6 @@ def render(meshes: Sequence[TriangleMesh], look: Look) -> ByteArray:
     k, (height, width) = _OVERSAMPLING, depth.shape
     cells = picture.reshape(height // k, k, width // k, k, 3).mean(axis=(1, 3))
     return np.rint(cells).astype(np.uint8)
-
-
-def _mixed(shares: FloatArray, of_corners: FloatArray) -> FloatArray:
-    return np.einsum("nk,nkc->nc", shares, of_corners)
 
 
 def _lit(color: FloatArray, normals: FloatArray) -> FloatArray:
@@ -164,8 +160,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lines:
+class Lines(NamedTuple):
     """Segments (N, 2, 2) drawn over a picture, in its pixels."""
 
     segments: FloatArray
@@ -173,8 +168,7 @@ class Lines:
     width: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Panel:
+class Panel(NamedTuple):
     """A picture, below it a title and notes, each in its colour, and lines over it."""
 
     picture: ByteArray
@@ -185,9 +179,8 @@ class Panel:
 
 def draw_sheet(rows: Sequence[Sequence[Panel]], path: Path, *, letters: bool = True) -> None:
     """Lay rows of panels out on a sheet, pixel on pixel, and write it as a small PNG."""
-    need("matplotlib")
     figures, agg = need("matplotlib.figure"), need("matplotlib.backends.backend_agg")
-    collections = need("matplotlib.collections")
+    collections = need("matplotlib.collections").LineCollection
     feet = [_GAP + round(1.5 * _TEXT) * (1 + max(len(p.notes) for p in row)) for row in rows]
     heights = [max(p.picture.shape[0] for p in row) for row in rows]
     widths = [sum(p.picture.shape[1] for p in row) for row in rows]
@@ -204,14 +197,8 @@ def draw_sheet(rows: Sequence[Sequence[Panel]], path: Path, *, letters: bool = T
             axes.imshow(panel.picture, interpolation="none", aspect="auto")
             axes.set(xlim=(-0.5, w - 0.5), ylim=(h - 0.5, -0.5), xticks=[], yticks=[])
             for lines in panel.lines:
-                axes.add_collection(
-                    collections.LineCollection(
-                        list(lines.segments),
-                        colors=lines.color,
-                        linewidths=72 * lines.width / _DPI,
-                        capstyle="round",
-                    )
-                )
+                look = {"linewidths": 72 * lines.width / _DPI, "capstyle": "round"}
+                axes.add_collection(collections(list(lines.segments), colors=lines.color, **look))
             letter = rf"$\bf{{({next(names)})}}$ " if letters and panel.title else ""
             told = [(letter + panel.title, INK, _TEXT), *((*note, _SMALL) for note in panel.notes)]
             for k, (text, color, size) in enumerate(told):
@@ -227,15 +214,14 @@ def draw_sheet(rows: Sequence[Sequence[Panel]], path: Path, *, letters: bool = T
 
 def _png(picture: ByteArray) -> bytes:
     """A PNG of so few colours that the file stays small."""
-    image, png = need("PIL.Image"), b""
+    image, buffer = need("PIL.Image"), io.BytesIO()
     for colors in _PALETTES:
         buffer = io.BytesIO()
         few = image.fromarray(picture).quantize(colors, image.Quantize.MEDIANCUT, kmeans=2)
         few.save(buffer, "PNG", optimize=True)
-        png = buffer.getvalue()
-        if len(png) <= _MOST_BYTES:
+        if buffer.tell() <= _MOST_BYTES:
             break
-    return png
+    return buffer.getvalue()
 
 
 def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from benchmarks.paper.baselines.feature_views import (
     feature_view,
     is_seen,
 )
+from benchmarks.paper.settings import REPEATED_DIAMETERS, RIGHT_DIAMETERS
 from benchmarks.paper.views import MADE, OBJECTS
 from benchmarks.study.study import Result, Unit
 from scanweld.errors import InputError
@@ -24,10 +25,6 @@ NAME = "features"
 
 GAPS_DEG = (10, 30, 50, 70, 90, 110)
 AZIMUTHS_DEG = (0, 45, 90, 135, 180, 225, 270, 315)
-REPEATED_DIAMETERS = 0.04
-"""A keypoint is repeated if the other view has one within this distance,"""
-RIGHT_DIAMETERS = 0.06
-"""and a match is right within this one."""
 NUM_NEAREST = 8
 NUM_EVEN = 200
 """Evenly spread points of each view at which all descriptors are compared."""

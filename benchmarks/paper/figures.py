@@ -1,28 +1,16 @@
 """Figures 1 to 6 of the paper, on the same objects and at the same view gaps."""
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 
+from benchmarks.paper import settings
 from benchmarks.paper.baselines.own import aligned, jointly_refined
 from benchmarks.paper.heat_field import HeatField, heat_field
 from benchmarks.paper.methods import METHODS
-from benchmarks.paper.settings import (
-    NUMERALS,
-    QUICK,
-    SETTINGS,
-    TUNED,
-    azimuths_of,
-    contour_settings,
-    is_converged,
-    outcome,
-    scans_of,
-    start_poses,
-)
 from benchmarks.paper.views import (
-    MADE,
     KnownPair,
     VirtualScan,
     data_file,
@@ -57,43 +45,24 @@ PAIR_METHODS = ("m-icc", "paper-coarse", "default")
 def units(quick: bool) -> list[Unit]:
     """A unit for each figure, or for each row or column of it."""
     if quick:
-        return [
-            {"figure": "pa-hks", "subject": MADE, "azimuth_deg": 60.0},
-            {"figure": "prunings", "object": MADE, "azimuths_deg": [45.0, 105.0]},
-            {"figure": "heat", "object": MADE, "azimuths_deg": [60.0, 90.0]},
-            _gallery_unit(QUICK, 20, seeds=1),
-        ]
-    return [
-        {"figure": "pa-hks", "subject": "armadillo", "azimuth_deg": 180.0},
-        {"figure": "pa-hks", "subject": "bun000", "azimuth_deg": None},
-        {"figure": "prunings", "object": "armadillo", "azimuths_deg": [150.0, 210.0]},
-        {"figure": "prunings", "object": "armadillo", "azimuths_deg": [135.0, 225.0]},
-        {"figure": "coarse", "object": "armadillo", "azimuths_deg": [145.0, 215.0]},
-        {"figure": "four views", "setting": "vii"},
-        {"figure": "heat", "object": "armadillo", "azimuths_deg": [120.0, 160.0, 200.0, 240.0]},
-        *(
-            _gallery_unit(numeral, degrees, GALLERY_SEEDS)
-            for degrees in GALLERY_START_DEG
-            for numeral in NUMERALS
-        ),
-    ]
+        return [*settings.STUDY["quick-figures"], _gallery_unit(settings.QUICK, 20, seeds=1)]
+    gallery = product(GALLERY_START_DEG, settings.NUMERALS)
+    gallery = (_gallery_unit(numeral, degrees, GALLERY_SEEDS) for degrees, numeral in gallery)
+    return [*settings.STUDY["figures"], *gallery]
 
 
 def _gallery_unit(numeral: str, degrees: int, seeds: int) -> Unit:
     unit = {"figure": "gallery", "setting": numeral, "start_deg": degrees, "seeds": seeds}
-    return {**unit, "tuning": {name: dict(tuning) for name, tuning in TUNED.items()}}
+    return {**unit, "tuning": {name: dict(tuning) for name, tuning in settings.TUNED.items()}}
 
 
 def measure(unit: Unit) -> Result:
     """Poses, keypoints and contours that a figure shows."""
-    return {
-        "pa-hks": _keypoints,
-        "prunings": _contours,
-        "coarse": _pair,
-        "four views": _four_views,
-        "heat": _heat,
-        "gallery": _gallery,
-    }[unit["figure"]](unit)
+    measuring = {
+        **{"pa-hks": _keypoints, "prunings": _contours, "coarse": _pair},
+        **{"four views": _four_views, "heat": _heat, "gallery": _gallery},
+    }
+    return measuring[unit["figure"]](unit)
 
 
 def subject(name: str, azimuth_deg: float | None) -> PreparedScan:
@@ -111,7 +80,7 @@ def pair_of(unit: Unit) -> KnownPair:
 
 def _keypoints(unit: Unit) -> Result:
     """Maxima of the heat signature as found, moved off the rims, and grouped."""
-    scan = subject(unit["subject"], unit["azimuth_deg"])
+    scan = subject(unit["subject"], unit.get("azimuth_deg"))
     field = heat_field(scan)
     points = field.front.points
     return {
@@ -193,8 +162,8 @@ def _pair(unit: Unit) -> Result:
 
 def _four_views(unit: Unit) -> Result:
     """Four views that close a ring: pairs by two methods, laid in a chain, and their refinement."""
-    setting = SETTINGS[unit["setting"]]
-    views = scans_of(setting)
+    setting = settings.SETTINGS[unit["setting"]]
+    views = settings.scans_of(setting)
     scans = [view.scan for view in views]
     fields = [heat_field(scan) for scan in scans]
     steps: dict[str, dict[int, Pose]] = {"start": {k: Pose.identity() for k in range(len(views))}}
@@ -205,7 +174,7 @@ def _four_views(unit: Unit) -> Result:
     if "default" in steps:
         steps["refined"] = jointly_refined(scans, steps["default"], setting.edges)
     return {
-        "azimuths_deg": azimuths_of(setting),
+        "azimuths_deg": settings.azimuths_of(setting),
         "diameter": views[0].diameter,
         "keypoints": [len(field.grouped) for field in fields],
         "heat": _heat_at(fields, len(fields[0].times) // 2),
@@ -226,15 +195,20 @@ def _chained(views: Sequence[VirtualScan], name: str) -> dict[int, Pose] | None:
 
 def _gallery(unit: Unit) -> Result:
     """M-ICC and MM-ICC of a setting of Table 2 from the same starts; the first one is shown."""
-    setting = SETTINGS[unit["setting"]]
-    views = scans_of(setting)
+    setting = settings.SETTINGS[unit["setting"]]
+    views = settings.scans_of(setting)
     scans = [view.scan for view in views]
-    starts = [start_poses(views, unit["start_deg"], seed) for seed in range(unit["seeds"])]
-    result: dict[str, Any] = {"azimuths_deg": azimuths_of(setting), "diameter": views[0].diameter}
+    starts = [settings.start_poses(views, unit["start_deg"], seed) for seed in range(unit["seeds"])]
+    result: dict[str, Any] = {
+        "azimuths_deg": settings.azimuths_of(setting),
+        "diameter": views[0].diameter,
+    }
     for method, tuning in unit["tuning"].items():
-        config = contour_settings(tuning)
+        config = settings.contour_settings(tuning)
         found = [aligned(method, scans, start, setting.edges, **config).poses for start in starts]
-        right = sum(is_converged(outcome(views, setting.edges, poses)) for poses in found)
+        right = sum(
+            settings.is_converged(settings.outcome(views, setting.edges, poses)) for poses in found
+        )
         result[method] = {**_assembly(setting.edges, views, found[0]), "converged": right}
     return result
 
@@ -245,4 +219,4 @@ def _assembly(
     """Poses in the frame of the first view, with their errors."""
     first = poses[0].inverse()
     matrices = [(first @ poses[k]).matrix().tolist() for k in sorted(poses)]
-    return {"poses": matrices, **outcome(views, edges, poses)}
+    return {"poses": matrices, **settings.outcome(views, edges, poses)}

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 from scipy.spatial import KDTree
 
-from benchmarks.features.spectrum import Spectrum, spectrum_of
+from benchmarks.features.spectral import Spectrum, spectrum_of
 from scanweld.config import HeatConfig
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.prepared import PreparedScan
@@ -18,29 +18,18 @@ from scanweld.heat.signature import diffusion_times, heat_signature
 _NEIGHBOURS = 4
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class HeatField:
-    """What ``scanweld.heat.describe`` goes through on its way to the keypoints of a scan.
+    """What ``scanweld.heat.describe`` goes through on its way to the keypoints of a scan."""
 
-    Attributes:
-        front: The thinned measured surface.
-        mesh: Closed by walls and a back plane.
-        spectrum: Eigenpairs of the closed mesh, on the front's points.
-        times: (T,) in squared diameters.
-        signature: (N, T) on the front's points.
-        found: (K,) front vertices of the persistent maxima that have an anchor off the rims.
-        moved: (K,) the anchors.
-        grouped: (G,) front vertices of the keypoints, strongest first.
-    """
-
-    front: FrontMesh
-    mesh: ArtificialMesh
-    spectrum: Spectrum
-    times: FloatArray
-    signature: FloatArray
-    found: IntArray
-    moved: IntArray
-    grouped: IntArray
+    front: FrontMesh  # The thinned measured surface
+    mesh: ArtificialMesh  # Closed by walls and a back plane
+    spectrum: Spectrum  # Eigenpairs of the closed mesh, on the front's points
+    times: FloatArray  # (T,) in squared diameters
+    signature: FloatArray  # (N, T) on the front's points
+    found: IntArray  # (K,) front vertices of persistent maxima that have an anchor off the rims
+    moved: IntArray  # (K,) the anchors
+    grouped: IntArray  # (G,) front vertices of the keypoints, strongest first
 
     @property
     def keypoints(self) -> FloatArray:
@@ -61,11 +50,8 @@ def heat_field(scan: PreparedScan) -> HeatField:
     front = thin_front(scan.image, config.max_front_vertices)
     mesh = close_front(front, scan.image.camera, scan.diameter)
     whole = spectrum_of(mesh.vertices, mesh.faces, scan.diameter, config.num_modes)
-    spectrum = Spectrum(
-        points=front.points,
-        eigenvalues=whole.eigenvalues,
-        functions=whole.functions[: mesh.num_front],
-    )
+    functions = whole.functions[: mesh.num_front]
+    spectrum = whole._replace(points=front.points, functions=functions)
     times = diffusion_times(whole.eigenvalues, config.num_times, config.longest_time_diameters2)
     signature = heat_signature(spectrum.eigenvalues, spectrum.functions, times)
     maxima = persistent_maxima(
@@ -74,13 +60,5 @@ def heat_field(scan: PreparedScan) -> HeatField:
     reach = config.group_diameters * scan.diameter
     moved, is_kept = move_off_rims(front, scan.image, maxima.vertices, reach)
     leaders = group(front.points[moved], signature[moved], maxima.strengths[is_kept], reach)
-    return HeatField(
-        front=front,
-        mesh=mesh,
-        spectrum=spectrum,
-        times=times,
-        signature=signature,
-        found=maxima.vertices[is_kept],
-        moved=moved,
-        grouped=moved[leaders],
-    )
+    found, grouped = maxima.vertices[is_kept], moved[leaders]
+    return HeatField(front, mesh, spectrum, times, signature, found, moved, grouped)

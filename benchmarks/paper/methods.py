@@ -1,63 +1,47 @@
 """All methods of the study by name, and what they make of a pair whose truth is known."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from benchmarks.paper.baselines import cpd, fpfh, gicp, kiss, own
 from benchmarks.paper.baselines.records import Method
 from benchmarks.paper.views import KnownPair
 from benchmarks.study.optional import is_usable, need
-from benchmarks.study.plots import Curve
 from scanweld.geometry.pose import Pose
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A method of the study.
+    """A method of the study."""
 
-    Attributes:
-        title: For people.
-        run: The method.
-        color: Of its curves: the project's own are strong, what needs a start is grey.
-        uses_start: Whether it starts at the given pose; else the pose makes no difference.
-        needs: Modules of the extra ``bench`` that it imports.
-    """
-
-    title: str
+    title: str  # For people
     run: Method
-    color: str
-    uses_start: bool = False
-    needs: tuple[str, ...] = ()
+    color: str  # Of its curves: the project's own are strong, what needs a start is grey
+    uses_start: bool = False  # Else the given pose makes no difference
+    needs: tuple[str, ...] = ()  # Modules of the extra ``bench`` that it imports
 
 
+_TO_PLANE: Method = partial(gicp.gicp, kind="PLANE_ICP")
 METHODS: dict[str, Entry] = {
     "icp": Entry("ICP", own.icp, "#B4B9C1", True),
-    "trimmed-icp": Entry("trimmed ICP", own.trimmed_icp, "#8C929C", True),
-    "point-to-plane": Entry(
-        "point-to-plane ICP", gicp.point_to_plane, "#737880", True, ("small_gicp",)
-    ),
+    "trimmed-icp": Entry("trimmed ICP", partial(own.icp, trim="auto"), "#8C929C", True),
+    "point-to-plane": Entry("point-to-plane ICP", _TO_PLANE, "#737880", True, ("small_gicp",)),
     "gicp": Entry("GICP", gicp.gicp, "#555B66", True, ("small_gicp",)),
     "cpd": Entry("CPD", cpd.cpd, "#D5D8DD", True, ("pycpd",)),
-    "m-icc": Entry("M-ICC", own.m_icc, "#E3B04B", True),
-    "mm-icc": Entry("MM-ICC", own.mm_icc, "#B8860B", True),
+    "m-icc": Entry("M-ICC", partial(own.icc, method="m-icc"), "#E3B04B", True),
+    "mm-icc": Entry("MM-ICC", own.icc, "#B8860B", True),
     "paper-coarse": Entry("the paper's coarse step", own.paper_coarse, "#E59AAA"),
     "paper": Entry("the paper's method", own.paper, "#C2274B"),
     "fpfh-ransac": Entry("FPFH + RANSAC + ICP", fpfh.fpfh_ransac, "#3B7D4F", needs=("open3d",)),
     "fgr": Entry("FGR + ICP", fpfh.fgr, "#7FB38A", needs=("open3d",)),
-    "kiss-gicp": Entry(
-        "KISS-Matcher + GICP", kiss.kiss_gicp, "#7A4FA3", needs=("kiss_matcher", "small_gicp")
-    ),
+    "kiss-gicp": Entry("KISS-Matcher + GICP", kiss.kiss_gicp, "#7A4FA3", needs=kiss.NEEDS),
     "default": Entry("scanweld", own.default, "#1B6CA8"),
 }
 """In the order in which tables show them."""
 BY_TITLE = {entry.title: name for name, entry in METHODS.items()}
-
-
-def curve(name: str, shares: Sequence[float]) -> Curve:
-    """Shares of a method as plots draw them."""
-    return Curve(shares, METHODS[name].color, is_strong=name in ("default", "paper"))
 
 
 def try_methods(

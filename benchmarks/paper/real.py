@@ -1,8 +1,6 @@
 """Pairs of the Stanford scans, with the truth that the data give."""
 
-import csv
 from functools import lru_cache
-from typing import Any
 
 from benchmarks.paper.views import KnownPair, data_file
 from benchmarks.sets import moved_scans
@@ -16,20 +14,6 @@ from scanweld.preparation import prepare
 
 SEED = 0
 """Of the frames that the scans are given in."""
-
-
-def overlaps_of(folder: str) -> list[dict[str, Any]]:
-    """The pairs of the scans in a folder: names "i" and "j", "overlap", "gap" in degrees."""
-    with data_file(f"{folder}/overlaps.csv").open(encoding="utf-8") as file:
-        return [
-            {
-                "i": row["i"],
-                "j": row["j"],
-                "overlap": min(float(row["overlap_ij"]), float(row["overlap_ji"])),
-                "gap": float(row["rotation_deg"]),
-            }
-            for row in csv.DictReader(file)
-        ]
 
 
 def real_pair(folder: str, names: tuple[str, ...], i: str, j: str) -> KnownPair:

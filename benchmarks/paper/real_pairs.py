@@ -3,18 +3,15 @@
 import zlib
 
 from benchmarks.paper.methods import METHODS, need_all, try_methods
-from benchmarks.paper.real import overlaps_of, real_pair
-from benchmarks.paper.views import MADE, KnownPair, known_pair, overlap_of, virtual_scan
-from benchmarks.sets import BUNNY, dragon
+from benchmarks.paper.real import real_pair
+from benchmarks.paper.views import MADE, KnownPair, data_file, known_pair, overlap_of, virtual_scan
+from benchmarks.sets import OBJECTS, overlaps_of
 from benchmarks.study.study import Result, Unit
 
 NAME = "real_pairs"
 
-REAL = {
-    "bunny": ("stanford-bunny", BUNNY, 360.0),
-    "dragon": ("stanford-dragon", dragon(24), 121.0),
-}
-"""Object -> folder, scans, largest rotation between the scans of a pair in degrees."""
+MAX_GAP_DEG = {"bunny": 360.0, "dragon": 121.0}
+"""Largest rotation between the scans of a pair of each object."""
 QUICK_GAPS = (40, 80)
 QUICK_NOISE = 1e-3
 QUICK_ROLL_DEG = 130.0
@@ -29,9 +26,9 @@ def units(quick: bool) -> list[Unit]:
     need_all(METHODS)
     pairs = [
         {"object": name, **row}
-        for name, (folder, names, max_gap_deg) in REAL.items()
-        for row in overlaps_of(folder)
-        if row["gap"] <= max_gap_deg and {row["i"], row["j"]} <= set(names)
+        for name, of in OBJECTS.items()
+        for row in overlaps_of(data_file(f"{of.folder}/overlaps.csv").parent)
+        if row["gap"] <= MAX_GAP_DEG[name] and {row["i"], row["j"]} <= set(of.scans)
     ]
     return [{**pair, "cpd": number % CPD_STEP == 0} for number, pair in enumerate(pairs)]
 
@@ -43,8 +40,8 @@ def measure(unit: Unit) -> Result:
     if name == MADE:
         pair, overlap = _virtual_pair(i, j), overlap_of(MADE, i, j)
     else:
-        folder, names, _ = REAL[name]
-        pair, overlap = real_pair(folder, tuple(names), i, j), unit["overlap"]
+        of = OBJECTS[name]
+        pair, overlap = real_pair(of.folder, of.scans, i, j), unit["overlap"]
     methods = [method for method in METHODS if method != "cpd" or unit["cpd"]]
     return {"overlap": overlap, "answers": try_methods(methods, pair, pair.any_start(seed), seed)}
 

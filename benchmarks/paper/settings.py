@@ -1,14 +1,14 @@
 """The seven settings of the paper's Table 2: views, starts, tuning and errors."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from benchmarks.paper.views import (
-    MADE,
     PIXELS,
     VirtualScan,
     camera_view,
@@ -35,21 +35,19 @@ NUM_SWEPT, FIRST_SWEPT = 8, 100
 """Other starts, by number and first seed, by which the tuning is chosen."""
 SWEEP_DEG = 40
 """The tuning is chosen by the hardest starts: from the others nearly all runs converge."""
+REPEATED_DIAMETERS = 0.04
+"""A keypoint is repeated if the other view has one within this distance,"""
+RIGHT_DIAMETERS = 0.06
+"""and a match is right within this one."""
 COARSE_RIGHT = Limit(deg=5.0, percent=2.0)
 """Within this a coarse pose is."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """A row of the paper's Table 2.
+Tuning = Mapping[str, float | int | None]
 
-    Attributes:
-        name: Of the object.
-        gap_deg: Between adjacent views.
-        num_views: Two, or four that close a ring.
-        kind: Views with the least or with the most self-occlusion.
-        printed: The paper's RMS of M-ICC and of its "Proposed"; it gives no unit.
-    """
+
+class Setting(NamedTuple):
+    """A row of the paper's Table 2, as study.toml describes it."""
 
     name: str
     gap_deg: int
@@ -65,40 +63,23 @@ class Setting:
         return (*chain, (self.num_views - 1, 0)) if closes else tuple(chain)
 
 
+def _tuning(change: Mapping[str, Any], used: Mapping[str, Any]) -> Tuning:
+    return {k: None if v == "auto" else v for k, v in {**used, **change}.items()}
+
+
+STUDY = tomllib.loads(Path(__file__).with_name("study.toml").read_text(encoding="utf-8"))
 QUICK = "quick"
 SETTINGS = {
-    "i": Setting("armadillo", 70, 2, "simple", (1.099, 0.290)),
-    "ii": Setting("armadillo", 70, 2, "complex", (3.169, 0.281)),
-    "iii": Setting("armadillo", 90, 2, "complex", (3.289, 0.233)),
-    "iv": Setting("bunny", 60, 2, "simple", (0.521, 0.189)),
-    "v": Setting("bunny", 60, 2, "complex", (5.116, 0.116)),
-    "vi": Setting("bunny", 90, 4, "complex", (1.595, 0.206)),
-    "vii": Setting("armadillo", 90, 4, "complex", (4.476, 0.279)),
-    QUICK: Setting(MADE, 60, 2, "complex"),
+    numeral: Setting(**{**row, "printed": tuple(row.get("printed", (0.0, 0.0)))})
+    for numeral, row in STUDY["settings"].items()
 }
 """The seven by numeral, and one that needs no data."""
 NUMERALS = tuple(numeral for numeral in SETTINGS if numeral != QUICK)
-
-Tuning = Mapping[str, float | int | None]
-TUNED: dict[str, Tuning] = {
-    "m-icc": {"tau": 3.0, "renders": 40, "trim": None},
-    "mm-icc": {"tau": 10.0, "renders": 40, "trim": 0.9},
-}
-"""What the sweep found best over all seven settings; the page says whether that is still so.
-
-tau_1 = tau_2 in pixels, renderings, and the share of matches kept in space (found anew if None;
-M-ICC's mutual matches are not trimmed)."""
+TUNED: dict[str, Tuning] = {name: _tuning({}, used) for name, used in STUDY["tuned"].items()}
 SWEEP: dict[str, list[Tuning]] = {
-    method: [{**TUNED[method], **change} for change in changes]
-    for method, changes in {
-        "m-icc": ({}, {"tau": 5.0}, {"tau": 10.0}, {"renders": 10}, {"renders": 20}),
-        "mm-icc": (
-            *({}, {"tau": 3.0}, {"tau": 5.0}, {"renders": 10}, {"renders": 20}),
-            *({"trim": 0.7}, {"trim": None}),
-        ),
-    }.items()
+    name: [_tuning(change, STUDY["tuned"][name]) for change in changes]
+    for name, changes in STUDY["sweep"].items()
 }
-"""One change of the tuning at a time."""
 
 
 def contour_settings(tuning: Mapping[str, Any]) -> dict[str, Any]:

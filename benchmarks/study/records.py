@@ -2,10 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import numpy as np
 
+from benchmarks.scores import Stated
 from benchmarks.study.study import Record
 
 Records = Sequence[Record]
@@ -23,9 +26,17 @@ def values_of(records: Iterable[Record], key: str) -> list[Any]:
     return list(dict.fromkeys(r.unit[key] for r in records))
 
 
-def grouped(records: Records, key: str, title: str = "{}") -> dict[str, list[Record]]:
-    """The records by a value of their units, which is put into a title."""
-    return {title.format(v): of(records, **{key: v}) for v in values_of(records, key)}
+def grouped(records: Iterable[Record], title: str) -> dict[str, list[Record]]:
+    """The records by a title with values of their units in it, such as "{gap}° apart"."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(title.format(**record.unit), []).append(record)
+    return groups
+
+
+def results(records: Iterable[Record], *path: Any) -> list[Any]:
+    """What stands at a path of keys in each result."""
+    return [reduce(getitem, path, record.result) for record in records]
 
 
 def answers(records: Iterable[Record], method: str) -> list[Answer]:
@@ -46,6 +57,12 @@ def beyond(records: Iterable[Record], gap: int) -> list[Record]:
 def overlapping(records: Iterable[Record], low: float, high: float) -> list[Record]:
     """The pairs whose overlap is from ``low`` and below ``high``."""
     return [r for r in records if low <= r.result["overlap"] < high]
+
+
+def by_overlap(records: Records, bins: Iterable[Sequence[float]]) -> dict[str, Records]:
+    """The pairs by their overlap in words, as far as there are any."""
+    inside = {overlap_title(*edges): overlapping(records, *edges) for edges in bins}
+    return {title: chosen for title, chosen in inside.items() if chosen}
 
 
 def overlap_title(low: float, high: float) -> str:
@@ -78,6 +95,11 @@ class Limit:
     def count(self, answers: Sequence[Answer]) -> str:
         """Right of all in words: "7 of 8"."""
         return f"{len(self.among(answers))} of {len(answers)}"
+
+    def auc(self, answers: Iterable[Answer]) -> float:
+        """How well the scores of the answers with a pose tell right from wrong."""
+        given = [each for each in answers if each["deg"] is not None]
+        return Stated.of((each["score"], self.holds(each)) for each in given).auc
 
     def cell(self, answers: Sequence[Answer], near: "Limit | None" = None) -> str:
         """Right of all, and the median rotation of the right ones: "7/8 0.03".

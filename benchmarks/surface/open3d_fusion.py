@@ -2,14 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import import_module
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.study.optional import need
 from scanweld.config import PrepareConfig
-from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -51,7 +49,7 @@ def shape_of(scan: PreparedScan, world_from_sensor: Pose) -> Shape:
 
 def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's truncated signed distances, in its grid of voxel blocks; one scan is enough."""
-    library = _open3d()
+    library = need("open3d")
     core, geometry = library.core, library.t.geometry
     kinds = (("tsdf", "weight"), (core.float32, core.float32), ((1), (1)))
     grid = geometry.VoxelBlockGrid(*kinds, voxel, block_resolution=8, block_count=MAX_BLOCKS)
@@ -69,7 +67,7 @@ def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
 
 def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     """Open3D's screened Poisson reconstruction, cut off where there are no points."""
-    o3d = _open3d()
+    o3d = need("open3d")
     points = np.concatenate([shape.world_points for shape in shapes])
     normals = [s.world_from_sensor.turn(np.asarray(s.mesh.normals)) for s in shapes]
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
@@ -80,13 +78,6 @@ def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     apart = o3d.geometry.PointCloud(mesh.vertices).compute_point_cloud_distance(cloud)
     mesh.remove_vertices_by_mask(np.asarray(apart) > POISSON_REACH_VOXELS * voxel)
     return _converted(mesh)
-
-
-def _open3d() -> ModuleType:
-    try:
-        return import_module("open3d")
-    except ImportError as error:
-        raise InputError(f"open3d: {error}: run pip install 'scanweld[bench]'") from error
 
 
 def _as_pinhole(shape: Shape) -> Shape:

@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from benchmarks.features.full_mesh_hks import (
-    full_mesh_spectrum,
-    thin_mesh,
-)
 from benchmarks.features.harris3d import harris_keypoints, harris_response
-from benchmarks.features.si_hks import octave_times, si_heat_signature
-from benchmarks.features.spectrum import Spectrum, spectrum_of
-from benchmarks.features.wks import energy_bands, wave_signature
+from benchmarks.features.spectral import (
+    Spectrum,
+    energy_bands,
+    full_mesh_spectrum,
+    octave_times,
+    si_heat_signature,
+    spectrum_of,
+    thin_mesh,
+    wave_signature,
+)
 from benchmarks.paper import features
 from benchmarks.paper.baselines.feature_views import DESCRIPTORS, DETECTORS
 from benchmarks.paper.features import QUESTIONS, answer

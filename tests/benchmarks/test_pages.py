@@ -1,18 +1,15 @@
 """Pages that benchmarks write say what their records say."""
 
-import importlib
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from jinja2 import UndefinedError
 
-from benchmarks.blocks import BLOCK
+from benchmarks import pages
+from benchmarks.blocks import BLOCK, TEMPLATES, grid
 from benchmarks.paper import method
 from benchmarks.paper.__main__ import TABLES
 from benchmarks.paper.pages import write_index, write_page
-from benchmarks.study.pages import grid, rendered
 from benchmarks.study.study import read_records
 from scanweld.errors import InputError
 from scanweld.evidence.evidence import MIN_AGREE
@@ -22,25 +19,14 @@ DOCS = ROOT / "docs"
 PAPER = DOCS / "paper"
 
 
-@pytest.fixture
-def pages(monkeypatch: pytest.MonkeyPatch):
-    """The script benchmarks/pages.py, imported from its own folder as scripts are."""
-    folder = ROOT / "benchmarks"
-    monkeypatch.syspath_prepend(str(folder))
-    yield importlib.import_module("pages")
-    for name, module in list(sys.modules.items()):
-        if getattr(module, "__file__", None) and Path(str(module.__file__)).parent == folder:
-            del sys.modules[name]
-
-
 @pytest.mark.parametrize("name", ["../README.md", "benchmarks.md", "model.md"])
-def test_measured_parts_are_those_of_the_results(name: str, pages: ModuleType):
+def test_measured_parts_are_those_of_the_results(name: str):
     text = (DOCS / name).read_text(encoding="utf-8")
     assert BLOCK.findall(text)
-    assert pages.rewritten(text) == text, "run python benchmarks/pages.py"
+    assert pages.rewritten(text) == text, "run python -m benchmarks.pages"
 
 
-def test_every_measured_part_stands_somewhere(pages: ModuleType):
+def test_every_measured_part_stands_somewhere():
     text = "".join(path.read_text(encoding="utf-8") for path in pages.PAGES)
     assert {name for _, name, _ in BLOCK.findall(text)} == set(pages.BLOCKS)
 
@@ -50,11 +36,11 @@ def test_method_is_what_its_template_and_the_results_make():
     assert committed == method.method_text(PAPER), "run python -m benchmarks.paper --pages"
 
 
-def test_a_template_refuses_to_leave_a_number_out(tmp_path: Path):
-    (tmp_path / "page.md").write_text("{{=evidence.evidence.MIN_AGREE}} {{ told.number }}")
-    assert rendered(tmp_path / "page.md", {"told": {"number": 3}}) == f"{MIN_AGREE:g} 3"
+def test_a_template_refuses_to_leave_a_number_out():
+    page = TEMPLATES.from_string("{{=evidence.evidence.MIN_AGREE}} {{ told.number }}")
+    assert page.render(told={"number": 3}) == f"{MIN_AGREE:g} 3"
     with pytest.raises(UndefinedError, match="number"):
-        rendered(tmp_path / "page.md", {"told": {}})
+        page.render(told={})
 
 
 def test_a_missing_result_is_told_in_one_line(tmp_path: Path):

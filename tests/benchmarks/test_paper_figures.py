@@ -20,7 +20,7 @@ from benchmarks.paper.drawing import (
 )
 from benchmarks.paper.heat_field import heat_field
 from benchmarks.paper.pages import write_page
-from benchmarks.paper.pages.placed import Placed
+from benchmarks.paper.placed import Placed
 from benchmarks.paper.views import virtual_scan
 from benchmarks.study.study import Record
 from scanweld.config import ContoursConfig, HeatConfig

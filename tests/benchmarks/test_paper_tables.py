@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.paper.ablations.parts import repeated
-from benchmarks.paper.ablations.search import rescored
+from benchmarks.paper.ablations import repeated
+from benchmarks.paper.ablations_search import rescored
 from benchmarks.paper.baselines.own import right_matches
 from benchmarks.paper.pages import write_page
 from benchmarks.paper.settings import (

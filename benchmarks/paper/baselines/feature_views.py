@@ -8,15 +8,18 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
-from benchmarks.features.full_mesh_hks import (
+from benchmarks.features.harris3d import harris_keypoints
+from benchmarks.features.spectral import (
+    energy_bands,
     full_mesh_hks,
     full_mesh_keypoints,
     full_mesh_spectrum,
+    octave_times,
+    si_heat_signature,
+    values_at,
+    wave_distances,
+    wave_signature,
 )
-from benchmarks.features.harris3d import harris_keypoints
-from benchmarks.features.si_hks import octave_times, si_heat_signature
-from benchmarks.features.spectrum import values_at
-from benchmarks.features.wks import energy_bands, wave_distances, wave_signature
 from benchmarks.paper.baselines.fpfh import fpfh
 from benchmarks.paper.heat_field import HeatField, heat_field
 from benchmarks.paper.views import VirtualScan, mesh_of, virtual_scan

@@ -1,6 +1,7 @@
 """FPFH features of Open3D with RANSAC or fast global registration, refined by ICP."""
 
 import os
+from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
@@ -27,44 +28,32 @@ FGR_NUM_TUPLES = 1000
 ICP_LEVELS = ((0.015, 0.03), (0.005, 0.01))
 """Voxel and farthest match of each level of the final point-to-plane ICP, in diameters."""
 ICP_ITERATIONS = 50
+Described = tuple[Any, Any]
+"""A cloud of Open3D and its features."""
 
 
 def fpfh_ransac(pair: ScanPair, start: Pose, seed: int) -> Answer:
     """FPFH (Rusu et al. 2009), RANSAC over mutual matches, ICP; its score is the ICP's fitness."""
-    library = _open3d(seed)
-    registration = library.pipelines.registration
-    clouds, reach = cloud_pair(pair), MATCH_VOXELS * VOXEL
-    (i, features_i), (j, features_j) = (_described(clouds, k, library) for k in (0, 1))
-    found = registration.registration_ransac_based_on_feature_matching(
-        *(j, i, features_j, features_i),
-        mutual_filter=True,
-        max_correspondence_distance=reach,
-        estimation_method=registration.TransformationEstimationPointToPoint(False),
-        ransac_n=3,
-        checkers=[
-            registration.CorrespondenceCheckerBasedOnEdgeLength(EDGE_RATIO),
-            registration.CorrespondenceCheckerBasedOnDistance(reach),
-        ],
-        criteria=registration.RANSACConvergenceCriteria(NUM_ITERATIONS, CONFIDENCE),
-    )
-    return _refined(clouds, found.transformation, library)
+    library, clouds = open3d(seed), cloud_pair(pair)
+    i, j = _described(library, clouds)
+    matrix = ransac(library, i, j, MATCH_VOXELS * VOXEL)
+    return _refined(library, clouds, matrix)
 
 
 def fgr(pair: ScanPair, start: Pose, seed: int) -> Answer:
     """FPFH, fast global registration (Zhou et al. 2016), ICP; its score is the ICP's fitness."""
-    library = _open3d(seed)
+    library, clouds = open3d(seed), cloud_pair(pair)
     registration = library.pipelines.registration
-    clouds = cloud_pair(pair)
-    (i, features_i), (j, features_j) = (_described(clouds, k, library) for k in (0, 1))
+    i, j = _described(library, clouds)
     found = registration.registration_fgr_based_on_feature_matching(
-        *(j, i, features_j, features_i),
+        *(j[0], i[0], j[1], i[1]),
         registration.FastGlobalRegistrationOption(
             use_absolute_scale=True,
             maximum_correspondence_distance=MATCH_VOXELS * VOXEL,
             maximum_tuple_count=FGR_NUM_TUPLES,
         ),
     )
-    return _refined(clouds, found.transformation, library)
+    return _refined(library, clouds, found.transformation)
 
 
 def fpfh(points: FloatArray, normals: FloatArray | None, at: FloatArray) -> FloatArray:
@@ -74,10 +63,10 @@ def fpfh(points: FloatArray, normals: FloatArray | None, at: FloatArray) -> Floa
     cloud.normals = library.utility.Vector3dVector(np.array(normals))
     cloud = cloud.voxel_down_sample(VOXEL)
     _, nearest = KDTree(np.asarray(cloud.points)).query(at)
-    return np.asarray(_features(cloud, library).data).T[nearest]
+    return np.asarray(features(library, cloud, VOXEL).data).T[nearest]
 
 
-def _open3d(seed: int) -> ModuleType:
+def open3d(seed: int) -> ModuleType:
     """Open3D on one thread: with more its RANSAC is not repeatable, whatever the seed."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     library = need("open3d")
@@ -86,38 +75,66 @@ def _open3d(seed: int) -> ModuleType:
     return library
 
 
-def _cloud(clouds: CloudPair, k: int, voxel: float, library: ModuleType) -> Any:
-    """One of the clouds, thinned, with normals towards the sensor."""
-    made = library.geometry.PointCloud(library.utility.Vector3dVector(clouds.points[k]))
-    made = made.voxel_down_sample(voxel)
-    made.estimate_normals(
-        library.geometry.KDTreeSearchParamHybrid(radius=NORMAL_VOXELS * voxel, max_nn=30)
-    )
-    made.orient_normals_towards_camera_location(-clouds.middles[k] / clouds.diameter)
+def thinned(library: ModuleType, points: FloatArray, voxel: float) -> Any:
+    """A cloud of Open3D with a point a voxel, and normals of either side."""
+    cloud = library.geometry.PointCloud(library.utility.Vector3dVector(np.array(points)))
+    cloud, near = cloud.voxel_down_sample(voxel), library.geometry.KDTreeSearchParamHybrid
+    cloud.estimate_normals(near(radius=NORMAL_VOXELS * voxel, max_nn=30))
+    return cloud
+
+
+def features(library: ModuleType, cloud: Any, voxel: float) -> Any:
+    """FPFH of a thinned cloud."""
+    near = library.geometry.KDTreeSearchParamHybrid(radius=FEATURE_VOXELS * voxel, max_nn=100)
+    return library.pipelines.registration.compute_fpfh_feature(cloud, near)
+
+
+def ransac(library: ModuleType, to: Described, moving: Described, reach: float) -> FloatArray:
+    """The (4, 4) matrix that most mutual matches of features agree on."""
+    registration = library.pipelines.registration
+    return registration.registration_ransac_based_on_feature_matching(
+        *(moving[0], to[0], moving[1], to[1]),
+        mutual_filter=True,
+        max_correspondence_distance=reach,
+        estimation_method=registration.TransformationEstimationPointToPoint(False),
+        ransac_n=3,
+        checkers=[
+            registration.CorrespondenceCheckerBasedOnEdgeLength(EDGE_RATIO),
+            registration.CorrespondenceCheckerBasedOnDistance(reach),
+        ],
+        criteria=registration.RANSACConvergenceCriteria(NUM_ITERATIONS, CONFIDENCE),
+    ).transformation
+
+
+def icp(
+    library: ModuleType, to: Any, moving: Any, reach: float, matrix: FloatArray, **how: Any
+) -> Any:
+    """What point-to-plane ICP makes of two clouds with normals, from a (4, 4) matrix."""
+    registration = library.pipelines.registration
+    plane = registration.TransformationEstimationPointToPlane()
+    return registration.registration_icp(moving, to, reach, matrix, plane, **how)
+
+
+def _clouds(library: ModuleType, clouds: CloudPair, voxel: float) -> list[Any]:
+    """Both clouds, thinned, with normals towards the sensors."""
+    made = [thinned(library, points, voxel) for points in clouds.points]
+    for cloud, middle in zip(made, clouds.middles, strict=True):
+        cloud.orient_normals_towards_camera_location(-middle / clouds.diameter)
     return made
 
 
-def _features(cloud: Any, library: ModuleType) -> Any:
-    around = library.geometry.KDTreeSearchParamHybrid(radius=FEATURE_VOXELS * VOXEL, max_nn=100)
-    return library.pipelines.registration.compute_fpfh_feature(cloud, around)
+def _described(library: ModuleType, clouds: CloudPair) -> Sequence[Described]:
+    both = _clouds(library, clouds, VOXEL)
+    return [(cloud, features(library, cloud, VOXEL)) for cloud in both]
 
 
-def _described(clouds: CloudPair, k: int, library: ModuleType) -> tuple[Any, Any]:
-    thinned = _cloud(clouds, k, VOXEL, library)
-    return thinned, _features(thinned, library)
-
-
-def _refined(clouds: CloudPair, matrix: FloatArray, library: ModuleType) -> Answer:
-    registration = library.pipelines.registration
+def _refined(library: ModuleType, clouds: CloudPair, matrix: FloatArray) -> Answer:
     if np.array_equal(matrix, np.eye(4)):
         return Answer(i_from_j=None, score=0.0, reason="no sample of matches fits")
     fitness = 0.0
+    steps = library.pipelines.registration.ICPConvergenceCriteria(max_iteration=ICP_ITERATIONS)
     for voxel, reach in ICP_LEVELS:
-        i, j = (_cloud(clouds, k, voxel, library) for k in (0, 1))
-        found = registration.registration_icp(
-            *(j, i, reach, matrix),
-            registration.TransformationEstimationPointToPlane(),
-            registration.ICPConvergenceCriteria(max_iteration=ICP_ITERATIONS),
-        )
+        i, j = _clouds(library, clouds, voxel)
+        found = icp(library, i, j, reach, matrix, criteria=steps)
         matrix, fitness = found.transformation, found.fitness
     return Answer(i_from_j=clouds.pose_of(matrix), score=fitness)

@@ -52,12 +52,7 @@ def refine(
 
 
 def gicp(pair: ScanPair, start: Pose, seed: int, kind: Kind = "GICP") -> Answer:
-    """Generalised ICP (Segal et al. 2009) from the start."""
+    """Generalised (Segal et al. 2009) or point-to-plane (Chen and Medioni 1992) ICP."""
     clouds = cloud_pair(pair)
     matrix, share = refine(clouds, clouds.matrix_of(start), kind)
     return Answer(i_from_j=clouds.pose_of(matrix), score=share)
-
-
-def point_to_plane(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """Point-to-plane ICP (Chen and Medioni 1992) from the start."""
-    return gicp(pair, start, seed, "PLANE_ICP")

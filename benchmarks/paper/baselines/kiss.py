@@ -9,6 +9,7 @@ from scanweld.geometry.pose import Pose
 
 VOXEL = 0.01
 """In diameters; 0.015 finds fewer pairs. The library derives radii and noise bounds from it."""
+NEEDS = ("kiss_matcher", "small_gicp")
 GICP_LEVELS = ((0.01, 0.03), (0.005, 0.015))
 
 

@@ -76,27 +76,25 @@ def searched(pair: ScanPair, config: Config) -> PairResult:
     return registrar.register(PairTask(edge=(0, 1)), *parts)
 
 
-def icp(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """Point-to-point ICP from the start; its score comes of the rms it ends with."""
-    return _icp(pair, start, None)
+def icp(pair: ScanPair, start: Pose, seed: int, trim: Trim = None) -> Answer:
+    """Point-to-point ICP from the start; its score comes of what it minimises.
 
-
-def trimmed_icp(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """The same with the share of matches found anew in each step (fractional ICP).
-
-    Its score comes of what it minimises: the rms over a power of the share.
+    Of all matches that is their rms; of a share that is found anew in each step (fractional ICP)
+    the rms over a power of the share.
     """
-    return _icp(pair, start, "auto")
+    samples = pair.j.samples.points
+    found = point_icp(samples, pair.i.mesh.vertices, start, trim)
+    share = found.num_matches / len(samples)
+    score = closeness(found.rms / share**FRACTION_EXPONENT, pair.diameter)
+    return Answer(i_from_j=found.target_from_source, score=score)
 
 
-def m_icc(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """M-ICC from the start; its score is the coherence of the contours."""
-    return _by_contours("m-icc", pair, start)
-
-
-def mm_icc(pair: ScanPair, start: Pose, seed: int) -> Answer:
-    """MM-ICC as published, from the start; its score is the coherence of the contours."""
-    return _by_contours("mm-icc", pair, start)
+def icc(pair: ScanPair, start: Pose, seed: int, method: str = "mm-icc") -> Answer:
+    """M-ICC or MM-ICC as published, from the start; its score is the coherence of the contours."""
+    found = aligned(method, (pair.i, pair.j), {0: Pose.identity(), 1: start})
+    if found.loose:
+        return Answer(i_from_j=None, score=0.0, reason="too few contours match")
+    return Answer(i_from_j=found.poses[0].inverse() @ found.poses[1], score=found.coherence)
 
 
 def paper_coarse(pair: ScanPair, start: Pose, seed: int) -> Answer:
@@ -110,7 +108,7 @@ def paper_coarse(pair: ScanPair, start: Pose, seed: int) -> Answer:
 def paper(pair: ScanPair, start: Pose, seed: int) -> Answer:
     """The published method: the coarse step, then MM-ICC, whose coherence is the score."""
     coarse = paper_coarse(pair, start, seed)
-    return coarse if coarse.i_from_j is None else mm_icc(pair, coarse.i_from_j, seed)
+    return coarse if coarse.i_from_j is None else icc(pair, coarse.i_from_j, seed)
 
 
 def default(pair: ScanPair, start: Pose, seed: int) -> Answer:
@@ -123,19 +121,3 @@ def default(pair: ScanPair, start: Pose, seed: int) -> Answer:
         reason=result.reason,
         accepted=result.kind is PairKind.GOOD,
     )
-
-
-def _icp(pair: ScanPair, start: Pose, trim: Trim) -> Answer:
-    samples = pair.j.samples.points
-    found = point_icp(samples, pair.i.mesh.vertices, start, trim)
-    share = found.num_matches / len(samples)
-    score = closeness(found.rms / share**FRACTION_EXPONENT, pair.diameter)
-    return Answer(i_from_j=found.target_from_source, score=score)
-
-
-def _by_contours(method: str, pair: ScanPair, start: Pose) -> Answer:
-    found = aligned(method, (pair.i, pair.j), {0: Pose.identity(), 1: start})
-    if found.loose:
-        return Answer(i_from_j=None, score=0.0, reason="too few contours match")
-    i_from_j = found.poses[0].inverse() @ found.poses[1]
-    return Answer(i_from_j=i_from_j, score=found.coherence)

@@ -21,20 +21,14 @@ class ScanPair:
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Answer:
-    """What a method says of a pair.
+    """What a method says of a pair."""
 
-    Attributes:
-        i_from_j: The pose between the sensor frames; None where the method finds none.
-        score: The method's own confidence, finite and at least 0 but for the default's, higher is
-            better; 0 where there is no pose.
-        reason: Why there is no pose, or what else the method says; empty where nothing.
-        accepted: Whether the method vouches for the pose; None where it does not judge its own.
-    """
-
-    i_from_j: Pose | None
+    i_from_j: Pose | None  # Between the sensor frames; None where the method finds none
+    # The method's own confidence, finite and at least 0 but for the default's, higher is better; 0
+    # where there is no pose.
     score: float
-    reason: str = ""
-    accepted: bool | None = None
+    reason: str = ""  # Why there is no pose, or what else the method says
+    accepted: bool | None = None  # Whether it vouches for the pose; None if it does not judge it
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.score):

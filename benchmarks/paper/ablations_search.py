@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 from benchmarks.paper.baselines.own import searched
-from benchmarks.paper.real import overlaps_of
-from benchmarks.paper.views import KnownPair
+from benchmarks.paper.views import KnownPair, data_file
 from benchmarks.scores import Stated
+from benchmarks.sets import overlaps_of
 from benchmarks.study.records import Limit
 from benchmarks.study.study import Record, Result, Unit
 from scanweld.config import Config, PairsConfig
@@ -43,7 +43,7 @@ def thin_real_pairs() -> list[Unit]:
     return [
         {"object": folder, **{key: row[key] for key in ("i", "j", "overlap")}}
         for folder in REAL
-        for row in overlaps_of(folder)
+        for row in overlaps_of(data_file(f"{folder}/overlaps.csv").parent)
         if THIN_OVERLAPS[0] <= row["overlap"] < THIN_OVERLAPS[1]
     ]
 

@@ -1,84 +1,52 @@
-"""The ablations as data: which pairs of views each takes, what it changes, and how it measures."""
+"""Ablations: what each part of the method is worth; study.toml has what they change."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from benchmarks.paper.ablations.search import measure as measure_search
+from benchmarks.paper import ablations_search as search
 from benchmarks.paper.baselines.feature_views import is_seen
 from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined, right_matches
-from benchmarks.paper.views import KnownPair, overlap_of
+from benchmarks.paper.real import real_pair
+from benchmarks.paper.settings import REPEATED_DIAMETERS, RIGHT_DIAMETERS, STUDY
+from benchmarks.paper.views import MADE, KnownPair, overlap_of, pair_units, virtual_pair
 from benchmarks.study.study import Result, Unit
-from scanweld.config import ContoursConfig, HeatConfig, RefineConfig
+from scanweld.config import ContoursConfig, HeatConfig
 from scanweld.contours.coherence import contour_pair
 from scanweld.contours.contour_sets import observe_contours
 from scanweld.geometry.pose import Pose
 from scanweld.heat.features import Features, describe
 
-Changes = Mapping[str, Mapping[str, Any]]
+NAME = "ablations"
+CONTOURS, PRUNED, TERMS = STUDY["contours"], STUDY["pruned"], STUDY["terms"]
+HEAT, COARSE = STUDY["heat"], STUDY["coarse"]
 """Variants by name, each with the settings that it changes."""
-
-PUBLISHED = "MM-ICC as published"
-CONTOURS: Changes = {
-    PUBLISHED: {},
-    "without pruning 1": {"prunings": ("observed", "predicted")},
-    "without pruning 2": {"prunings": ("self-occlusion", "predicted")},
-    "without pruning 3": {"prunings": ("self-occlusion", "observed")},
-    "without any pruning": {"prunings": ()},
-    "eq. 4 by place": {"self_occlusion": "place"},
-    "eq. 6 by depth": {"predicted_visibility": "depth"},
-    "eq. 6 by the observed normal": {"predicted_visibility": "observed normal"},
-    "eq. 6 as printed": {"predicted_visibility": "printed"},
-    "mutual matches": {"matching": "mutual"},
-    "all matches, untrimmed": {"trim": 1.0},
-    "distance in the image": {"residual": "image"},
-    "distance in space": {"residual": "point"},
-    "then across the outline": {"residual": "normal"},
-}
-"""What is changed against MM-ICC as published: face normals in eq. 6, trimmed matches."""
-PRUNED: Changes = {
-    "none": {"prunings": ()},
-    "1 and 2": {"prunings": ("self-occlusion", "observed")},
-    "1, 2 and 3": {"prunings": ("self-occlusion", "observed", "predicted")},
-}
+PUBLISHED, ALONE, CLOSED = "MM-ICC as published", "contours alone", "closed, cut at jumps"
 PERCENTILES = (25, 50, 75, 90)
+TERMS_NOISE, TERMS_START_DEG = STUDY["parts"]["terms"]["more"]["noise"], 2.0
 
-ALONE = "contours alone"
-TERMS: Changes = {
-    "surfaces alone": {"contour_weight": 0.0},
-    "both": {"contour_weight": RefineConfig().contour_weight},
-    "both, alike": {"contour_weight": 1.0},
-}
-TERMS_NOISE, TERMS_START_DEG = 1e-3, 2.0
 
-CLOSED = "closed, cut at jumps"
-HEAT: Changes = {
-    CLOSED: {},
-    "closed, jumps bridged": {"jumps": "bridged"},
-    "open (Neumann)": {"surface": "open"},
-    "open, cold rims (Dirichlet)": {"surface": "clamped"},
-    "closed, times of Sun et al.": {"times": "sun"},
-}
-REPEATED_DIAMETERS = 0.04
-"""A keypoint is repeated if the other view has one within this distance,"""
-RIGHT_DIAMETERS = 0.06
-"""and a match is right within this one."""
+def units(quick: bool) -> list[Unit]:
+    """Pairs of views for each part, and the thin ones among the real pairs for the search."""
+    units = []
+    for name, part in STUDY["parts"].items():
+        more = {"part": name, **part.get("more", {})}
+        if quick:
+            units.append({"object": MADE, "gap": part["quick_gap"], "azimuth": 0, **more})
+        else:
+            units += pair_units(part["gaps"], range(0, 360, part["step_deg"]), **more)
+    real = () if quick else search.thin_real_pairs()
+    return [*units, *({"part": "search", **unit} for unit in real)]
 
-COARSE: Changes = {
-    "as taken": {},
-    "the better half of the matches": {"signature_quantile": 0.5},
-    "the better quarter of the matches": {"signature_quantile": 0.25},
-    "mutual matches": {"mutual": True},
-    "ICP of the keypoints alone": {"icp": "keypoints"},
-    "trimmed ICP": {"trim": "auto"},
-    "ours: start where the nearest signatures agree": {"start": "consensus"},
-    "ours: start where the evidence is best": {"start": "evidence"},
-    "the former, trimmed ICP": {"start": "consensus", "trim": "auto"},
-    "the latter, trimmed ICP": {"start": "evidence", "trim": "auto"},
-}
+
+def measure(unit: Unit) -> Result:
+    """Measure one unit of its part."""
+    if "i" in unit:
+        return search.measure(real_pair(unit["object"], (), unit["i"], unit["j"]), unit)
+    noise = unit.get("noise", 0.0)
+    pair = virtual_pair(unit["object"], unit["azimuth"], unit["gap"], noise)
+    return PARTS[unit["part"]](pair, unit)
 
 
 def measure_contours(pair: KnownPair, unit: Unit) -> Result:
@@ -172,23 +140,7 @@ def _error(pair: KnownPair, poses: Mapping[int, Pose]) -> dict[str, float | None
     return pair.error(poses[0].inverse() @ poses[1])
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """One ablation: how it measures a pair, which gaps and azimuths, what else its units hold."""
-
-    measure: Callable[[KnownPair, Unit], Result]
-    gaps: Sequence[int]
-    azimuths: Sequence[int]
-    more: Mapping[str, Any] = field(default_factory=dict)
-    quick_gap: int = 30
-
-
-QUARTERS, EIGHTHS = range(0, 360, 90), range(0, 360, 45)
-PARTS = {
-    "contours": Part(measure_contours, (30, 60, 90), QUARTERS, {"starts": (20, 40)}, 60),
-    "terms": Part(measure_terms, (60, 90, 110, 120), EIGHTHS, {"noise": TERMS_NOISE}, 90),
-    "heat": Part(measure_heat, (30, 60, 90), QUARTERS),
-    "coarse": Part(measure_coarse, (10, 30, 50, 70, 90), QUARTERS),
-    "search": Part(measure_search, (90, 100, 110, 120), EIGHTHS, quick_gap=90),
+PARTS: Mapping[str, Callable[[KnownPair, Unit], Result]] = {
+    **{"contours": measure_contours, "terms": measure_terms, "heat": measure_heat},
+    **{"coarse": measure_coarse, "search": search.measure},
 }
-"""In the order in which they are measured and shown."""

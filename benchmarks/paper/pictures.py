@@ -1,7 +1,6 @@
 """The pictures on the page of the figures, drawn from what was measured, and words about them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ from benchmarks.paper.drawing import (
 from benchmarks.paper.figures import pair_of, subject
 from benchmarks.paper.heat_field import HeatField, heat_field
 from benchmarks.paper.methods import METHODS
-from benchmarks.paper.pages.placed import Placed
+from benchmarks.paper.placed import Placed
 from benchmarks.paper.settings import SETTINGS, scans_of
 from benchmarks.paper.views import MADE, virtual_scan
 from benchmarks.study.records import Records, grouped, of, values_of
@@ -70,14 +69,10 @@ STEPS = {
 def draw(records: Records, out: Path) -> None:
     """Draw all figures that were measured."""
     draw_figure = {
-        "pa-hks": _keypoints,
-        "prunings": _prunings,
-        "coarse": _coarse,
-        "four views": _four_views,
-        "heat": _heat,
-        "gallery": _gallery,
+        **{"pa-hks": _keypoints, "prunings": _prunings, "coarse": _coarse},
+        **{"four views": _four_views, "heat": _heat, "gallery": _gallery},
     }
-    for figure, own in grouped(records, "figure").items():
+    for figure, own in grouped(records, "{figure}").items():
         draw_figure[figure](own, out)
 
 
@@ -85,11 +80,6 @@ def gap_of(record: Record) -> int:
     """Between the first two views, in degrees."""
     first, second = record.unit["azimuths_deg"][:2]
     return round(second - first)
-
-
-def count(points: Sequence[Any]) -> str:
-    """How many points there are."""
-    return f"{len(points):,}"
 
 
 def by_object(records: Records) -> dict[str, Records]:
@@ -128,40 +118,30 @@ def _short(value: float) -> str:
 
 def _keypoints(records: Records, out: Path) -> None:
     """Figure 1: from a scan to its PA-HKS keypoints."""
-    rows = [
-        _keypoint_row(subject(r.unit["subject"], r.unit["azimuth_deg"]), r.result) for r in records
-    ]
-    draw_sheet(rows, out / "fig1-pa-hks.png")
+    draw_sheet([_keypoint_row(record) for record in records], out / "fig1-pa-hks.png")
 
 
-def _keypoint_row(scan: PreparedScan, result: Mapping[str, Any]) -> list[Panel]:
+def _keypoint_row(record: Record) -> list[Panel]:
+    result, shown = record.result, record.unit
+    scan = subject(shown["subject"], shown.get("azimuth_deg"))
     size, radius = (WIDTH // 4, 430), _BALL * scan.diameter
     mesh, pale = _artificial_mesh(heat_field(scan)), colored(scan.mesh, CLAY)
     before, after, grouped = (np.array(result[key]) for key in ("before", "after", "grouped"))
     is_moved = np.linalg.norm(after - before, axis=1) > 1e-6 * scan.diameter
     look = look_at(scan.mesh.vertices, _FROM_FRONT, _UP, size)
     behind = look_at(mesh.vertices, _FROM_BEHIND, _UP, size)
-    left = balls(before[is_moved], 0.8 * radius, ACCENT)
+    left, black = balls(before[is_moved], 0.8 * radius, ACCENT), balls(after, radius, INK)
     ways = Lines(look.pixels(np.stack([before, after], axis=1)[is_moved]), ACCENT, 2.6)
     faces = f"{result['front_faces']:,} + {result['other_faces']:,} faces"
-    told = f"{len(after)} maxima, {result['moved']} moved off the rim"
-    shown = (
-        (
-            render([colored(scan.mesh, SCANS[3])], look),
-            "range scan",
-            f"{result['pixels']:,} pixels",
-        ),
-        (render([mesh], behind), "artificial mesh", faces),
-        (render([pale, balls(after, radius, INK), left], look), "shifted to the front", told),
-        (
-            render([pale, balls(grouped, radius, INK)], look),
-            "grouped",
-            f"{len(grouped)} keypoints",
-        ),
-    )
-    panels = [Panel(picture, title, [(note, QUIET)]) for picture, title, note in shown]
-    panels[2] = replace(panels[2], lines=[ways])
-    return panels
+    maxima = f"{len(after)} maxima, {result['moved']} moved off the rim"
+    kept, found = f"{len(grouped)} keypoints", [pale, balls(grouped, radius, INK)]
+    seen, pixels = [colored(scan.mesh, SCANS[3])], f"{result['pixels']:,} pixels"
+    return [
+        Panel(render(seen, look), "range scan", [(pixels, QUIET)]),
+        Panel(render([mesh], behind), "artificial mesh", [(faces, QUIET)]),
+        Panel(render([pale, black, left], look), "shifted to the front", [(maxima, QUIET)], [ways]),
+        Panel(render(found, look), "grouped", [(kept, QUIET)]),
+    ]
 
 
 def _artificial_mesh(field: HeatField) -> TriangleMesh:
@@ -282,7 +262,7 @@ def _gallery(records: Records, out: Path) -> None:
         width = min(WIDTH // len(numerals), 534)
         rows = [
             [_gallery_panel(of(at_start, setting=n)[0], method, width) for n in numerals]
-            for at_start in grouped(own, "start_deg").values()
+            for at_start in grouped(own, "{start_deg}").values()
             for method in ("m-icc", "mm-icc")
         ]
         draw_sheet(rows, out / f"fig6{letter}-gallery-{name}.png", letters=False)
@@ -296,4 +276,4 @@ def _gallery_panel(record: Record, method: str, width: int) -> Panel:
     right = f"{result['converged']} of {record.unit['seeds']} right"
     title = f"{METHODS[method].title} from {record.unit['start_deg']}°"
     panel = placed.panel(_poses(result), title, f"RMS {rms(record, result)}, {right}")
-    return replace(panel, notes=[*panel.notes, (views, QUIET)])
+    return panel._replace(notes=[*panel.notes, (views, QUIET)])
