@@ -18,6 +18,7 @@ from scanweld.app.options import (
     Wanted,
     Workers,
     takes,
+    without_collecting,
 )
 from scanweld.choices import Method
 
@@ -110,10 +111,11 @@ class RunOptions:
 @takes(RunOptions)
 def run(options: RunOptions) -> None:
     """Register and fuse scans: poses, a model and a verdict."""
-    from scanweld.app.cache import cache_folder
-    from scanweld.app.job import Limits, run_job
-    from scanweld.app.memory import parse_size
-    from scanweld.config import load_config
+    with without_collecting():
+        from scanweld.app.cache import cache_folder
+        from scanweld.app.job import Limits, run_job
+        from scanweld.app.memory import parse_size
+        from scanweld.config import load_config
 
     output, memory = options.output, options.memory
     fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
@@ -166,8 +168,9 @@ class FuseOptions:
 @takes(FuseOptions)
 def fuse(options: FuseOptions) -> None:
     """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
-    from scanweld.app.fuse import fuse_job
-    from scanweld.config import load_config
+    with without_collecting():
+        from scanweld.app.fuse import fuse_job
+        from scanweld.config import load_config
 
     settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
     with options.show.reporting() as progress:
