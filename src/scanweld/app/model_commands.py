@@ -113,6 +113,7 @@ def run(options: RunOptions) -> None:
     """Register and fuse scans: poses, a model and a verdict."""
     with without_collecting():
         from scanweld.app.cache import cache_folder
+        from scanweld.app.first_run import compiling_ahead
         from scanweld.app.job import Limits, run_job
         from scanweld.app.memory import parse_size
         from scanweld.config import load_config
@@ -121,8 +122,12 @@ def run(options: RunOptions) -> None:
     fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
     settings = load_config(options.config, unit=options.unit, method=options.method, fusion=fusion)
     known = options.facts.known()
+    processes = options.workers if memory is None else 1  # others would take memory too
     try:
-        with options.show.reporting() as progress:
+        with (
+            compiling_ahead(options.show.tell, processes),
+            options.show.reporting() as progress,
+        ):
             size = None if memory is None else parse_size(memory)
             limits = Limits(
                 workers=options.workers,
@@ -169,11 +174,15 @@ class FuseOptions:
 def fuse(options: FuseOptions) -> None:
     """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
     with without_collecting():
+        from scanweld.app.first_run import compiling_ahead
         from scanweld.app.fuse import fuse_job
         from scanweld.config import load_config
 
     settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
-    with options.show.reporting() as progress:
+    with (
+        compiling_ahead(options.show.tell, options.workers),
+        options.show.reporting() as progress,
+    ):
         result = fuse_job(
             options.inputs,
             options.poses,

@@ -160,6 +160,11 @@ class ShowOptions:
 
         return reporting(quiet=self.quiet, verbose=self.verbose, as_json=self.as_json)
 
+    def tell(self, line: str) -> None:
+        """Say something to whoever watches a run, before its progress is shown."""
+        if not (self.quiet or self.as_json):
+            typer.echo(line, err=True)
+
     def finish(self, result: "Reconstruction", output: Path) -> None:
         """Print the verdict, and leave with its exit code."""
         from scanweld.app.json_lines import finished_line

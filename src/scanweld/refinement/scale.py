@@ -109,9 +109,9 @@ def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:
     camera = np.array(source.camera)
     if camera[0] != 0.0:
         camera[1:3] /= factor
-    return replace(
-        source, points=factor * source.points, depth=factor * source.depth, camera=camera
-    )
+    depth = factor * source.depth
+    depth.flags.writeable = False  # as that of scans is: the kernel is then compiled once only
+    return replace(source, points=factor * source.points, depth=depth, camera=camera)
 
 
 def _surface_terms(
