@@ -88,6 +88,7 @@ def estimate_scales(
             return {}
         centres = {k: poses[k].apply(grown[k].points.mean(axis=0)) for k in order}
         twists, steps, spreads = _solve(terms, order, centres, arm)
+        terms.clear()  # those of the next round take as much memory
         middle = np.mean([centres[k] for k in order], axis=0)
         for k, twist, step, spread in zip(order, twists, steps, spreads, strict=True):
             # Grown about the sensor in the next round, it is moved back to where it was.
