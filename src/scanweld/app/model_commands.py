@@ -11,6 +11,7 @@ from scanweld.app.options import (
     Force,
     Inputs,
     MovedScans,
+    NoCacheOption,
     Output,
     ShowOptions,
     SurfaceOptions,
@@ -91,10 +92,7 @@ class RunOptions:
         str | None,
         typer.Option(metavar="ADDRESS", help="A dask cluster to work on, as tcp://host:8786."),
     ] = None
-    no_cache: Annotated[
-        bool,
-        typer.Option("--no-cache", help="Neither keep finished work beside the output nor use it."),
-    ] = False
+    no_cache: NoCacheOption = False
     unit: UnitOption = None
     method: Annotated[
         Method | None, typer.Option(help="robust (the default), or paper: as published.")
@@ -164,6 +162,7 @@ class FuseOptions:
     output: Output
     config: ConfigFile = None
     workers: Workers = None
+    no_cache: NoCacheOption = False
     unit: UnitOption = None
     surface: SurfaceOptions
     force: Force = False
@@ -176,6 +175,7 @@ def fuse(options: FuseOptions) -> None:
     with without_collecting():
         from scanweld.app.first_run import compiling_ahead
         from scanweld.app.fuse import fuse_job
+        from scanweld.app.job import Limits
         from scanweld.config import load_config
 
     settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
@@ -188,7 +188,7 @@ def fuse(options: FuseOptions) -> None:
             options.poses,
             options.output,
             settings,
-            workers=options.workers,
+            limits=Limits(workers=options.workers, keeps=not options.no_cache),
             force=options.force,
             progress=progress,
         )

@@ -29,6 +29,10 @@ Inputs = Annotated[
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
+NoCacheOption = Annotated[
+    bool,
+    typer.Option("--no-cache", help="Neither keep nor use finished work beside the output."),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
 UnitOption = Annotated[Unit | None, typer.Option(help="Unit of the scans' coordinates.")]
 MovedScans = Annotated[list[str], typer.Option(help="The scans, if they have been moved since.")]
