@@ -124,6 +124,15 @@ def test_results_come_in_the_items_order_and_each_part_is_sent_once():
         assert list(cluster.map(add, [1])) == [1]
 
 
+def test_a_cluster_without_workers_is_not_waited_for_for_ever(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(cluster_module, "WAIT_SECONDS", 2)
+    with local_cluster(1) as local, Cluster(local.scheduler_address) as cluster:
+        assert list(cluster.map(add, [1])) == [1]
+        local.scale(0)
+        with pytest.raises(InputError, match="all workers of the cluster are gone; start some by"):
+            list(cluster.map(add, [2]))
+
+
 def test_workers_that_are_not_like_us_are_refused(monkeypatch: pytest.MonkeyPatch):
     with local_cluster(1) as local:
         with Cluster(local.scheduler_address) as cluster:

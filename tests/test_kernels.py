@@ -11,6 +11,7 @@ import pytest
 from numba.core import config
 
 import scanweld
+from scanweld.app import first_run
 from scanweld.compiled import kernels, source
 from scanweld.compiled.kernels import provide_cache
 
@@ -49,6 +50,19 @@ ASK = """
 import scanweld.compiled.kernels
 from scanweld.caller import total
 print(total(10), len(total.stats.cache_hits), len(total.stats.cache_misses))
+"""
+
+
+RUN = """
+import sys
+from scanweld.app import cli, first_run
+try:
+    cli.main(["run", sys.argv[1], "-o", sys.argv[1] + "/model", "--quiet", "--workers", "1"])
+except SystemExit:
+    pass
+for name in first_run.KERNELS:
+    if others := set(first_run.kernel(name).overloads) - {first_run.argument_types(name)}:
+        print(name, others)
 """
 
 
@@ -142,3 +156,30 @@ def test_folders_of_earlier_states_go_when_they_are_old(
     kept = {path.name.removeprefix(kernels.PREFIX) for path in own.parent.iterdir() if path != own}
     assert kept == {"0", "1", "2"} and own.is_dir()
     assert not caplog.records
+
+
+def test_a_run_calls_kernels_with_what_they_are_compiled_for_ahead(tmp_path: Path):
+    scanweld.simulate(scanweld.creature(0), tmp_path, num_scans=6, pixels=80)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    told = [line for line in done.stdout.splitlines() if line.split(" ")[0] in first_run.KERNELS]
+    assert told == []
+    assert (tmp_path / "model" / "model.ply").exists(), "it got as far as the fusion"
+
+
+def test_another_process_compiles_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    one = "geometry.mesh.connected"
+    assert set(first_run.KERNELS) >= set(first_run.missing_kernels())
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(first_run, "missing_kernels", lambda: [one])
+    with first_run.compiling_ahead(print, workers=2):
+        until = time.monotonic() + 60
+        while not list(tmp_path.rglob("mesh.connected-*.nbc")) and time.monotonic() < until:
+            time.sleep(0.1)
+    assert list(tmp_path.rglob("mesh.connected-*.nbi")) and "once" in capsys.readouterr().out
+    monkeypatch.setattr(first_run, "missing_kernels", list)
+    with first_run.compiling_ahead(print):
+        assert not capsys.readouterr().out, "nothing is said where nothing is missing"

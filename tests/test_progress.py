@@ -132,8 +132,12 @@ def test_json_is_one_object_a_line_and_ends_with_the_verdict(
     assert again[-1]["event"] == "finished" and again[-1]["verdict"] == "partial"
     assert "broken" in {line.get("scan") for line in again}
     # And told to nobody.
+    kept = sorted(Path(".scanweld-cache").iterdir())
     assert command(*fuse, "-o", "quiet", "-q") == 3
     assert capsys.readouterr().err == ""
+    # From what was kept, which gives the same model.
+    assert sorted(Path(".scanweld-cache").iterdir()) == kept
+    assert Path("quiet/model.ply").read_bytes() == Path("fused/model.ply").read_bytes()
 
 
 def test_an_error_is_a_line_on_stderr_and_no_verdict(

@@ -3,8 +3,9 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from scanweld.app.cache import FileCache, cache_folder
 from scanweld.app.html_report import write_html_report
-from scanweld.app.job import read_all, relative_paths
+from scanweld.app.job import NO_LIMITS, Limits, read_all, relative_paths
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
@@ -29,7 +30,7 @@ def fuse_job(
     output: Path,
     config: Config | None = None,
     *,
-    workers: int | None = None,
+    limits: Limits = NO_LIMITS,
     force: bool = False,
     progress: Progress = silent,
 ) -> Reconstruction:
@@ -40,7 +41,7 @@ def fuse_job(
         poses: A file of poses in any format that scanweld knows, or a folder of them.
         output: The folder to be made; it appears when it is whole.
         config: Settings; the defaults if not given.
-        workers: Threads; as many as there are cores if not given.
+        limits: Its workers and whether it keeps finished work; nothing else of them is used.
         force: Whether an output that is there already is replaced.
         progress: Told of stages, their finished items, and scans that are refused.
 
@@ -58,7 +59,8 @@ def fuse_job(
     parts = [*(poses.iterdir() if poses.is_dir() else [poses]), *(file.path for file in files)]
     with Workspace(output, inputs=parts, force=force) as workspace:
         scans, unreadable = read_all([file for file in files if file.name in known], progress)
-        stages = Stages(workers=num_workers(workers), cache=NoCache(), progress=progress)
+        cache = FileCache(cache_folder(output)) if limits.keeps else NoCache()
+        stages = Stages(workers=num_workers(limits.workers), cache=cache, progress=progress)
         without = {
             file.name: f"no pose in {poses.name}" for file in files if file.name not in known
         }
@@ -91,6 +93,7 @@ def _fuse(
             config.fusion,
             prepare=config.prepare,
             workers=stages.workers,
+            cache=stages.cache,
         )
         counts["faces"] = len(mesh.faces)
     pairs = zip(intake.prepared, world_from_sensor, strict=True)

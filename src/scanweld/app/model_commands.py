@@ -11,6 +11,7 @@ from scanweld.app.options import (
     Force,
     Inputs,
     MovedScans,
+    NoCacheOption,
     Output,
     ShowOptions,
     SurfaceOptions,
@@ -18,6 +19,7 @@ from scanweld.app.options import (
     Wanted,
     Workers,
     takes,
+    without_collecting,
 )
 from scanweld.choices import Method
 from scanweld.errors import ExitCode
@@ -89,10 +91,7 @@ class RunOptions:
         str | None,
         typer.Option(metavar="ADDRESS", help="A dask cluster to work on, as tcp://host:8786."),
     ] = None
-    no_cache: Annotated[
-        bool,
-        typer.Option("--no-cache", help="Neither keep finished work beside the output nor use it."),
-    ] = False
+    no_cache: NoCacheOption = False
     unit: UnitOption = None
     method: Annotated[
         Method | None, typer.Option(help="robust (the default), or paper: as published.")
@@ -109,17 +108,23 @@ class RunOptions:
 @takes(RunOptions)
 def run(options: RunOptions) -> None:
     """Register and fuse scans: poses, a model and a verdict."""
-    from scanweld.app.cache import cache_folder
-    from scanweld.app.job import Limits, run_job
-    from scanweld.app.memory import parse_size
-    from scanweld.config import load_config
+    with without_collecting():
+        from scanweld.app.cache import cache_folder
+        from scanweld.app.first_run import compiling_ahead
+        from scanweld.app.job import Limits, run_job
+        from scanweld.app.memory import parse_size
+        from scanweld.config import load_config
 
     output, memory = options.output, options.memory
     fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
     settings = load_config(options.config, unit=options.unit, method=options.method, fusion=fusion)
     known = options.facts.known()
+    processes = options.workers if memory is None else 1  # others would take memory too
     try:
-        with options.show.reporting() as progress:
+        with (
+            compiling_ahead(options.show.tell, processes),
+            options.show.reporting() as progress,
+        ):
             size = None if memory is None else parse_size(memory)
             limits = Limits(
                 workers=options.workers,
@@ -156,6 +161,7 @@ class FuseOptions:
     output: Output
     config: ConfigFile = None
     workers: Workers = None
+    no_cache: NoCacheOption = False
     unit: UnitOption = None
     surface: SurfaceOptions
     force: Force = False
@@ -165,17 +171,23 @@ class FuseOptions:
 @takes(FuseOptions)
 def fuse(options: FuseOptions) -> None:
     """Fuse scans whose poses are known; exit code 3 if some had to be left out."""
-    from scanweld.app.fuse import fuse_job
-    from scanweld.config import load_config
+    with without_collecting():
+        from scanweld.app.first_run import compiling_ahead
+        from scanweld.app.fuse import fuse_job
+        from scanweld.app.job import Limits
+        from scanweld.config import load_config
 
     settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
-    with options.show.reporting() as progress:
+    with (
+        compiling_ahead(options.show.tell, options.workers),
+        options.show.reporting() as progress,
+    ):
         result = fuse_job(
             options.inputs,
             options.poses,
             options.output,
             settings,
-            workers=options.workers,
+            limits=Limits(workers=options.workers, keeps=not options.no_cache),
             force=options.force,
             progress=progress,
         )

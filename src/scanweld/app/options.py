@@ -1,7 +1,8 @@
 """What commands take: options as records, and those that several commands share."""
 
+import gc
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from enum import StrEnum
 from functools import wraps
@@ -25,6 +26,10 @@ Inputs = Annotated[
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to be made.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="Settings, a TOML file.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads; all cores if not given.")]
+NoCacheOption = Annotated[
+    bool,
+    typer.Option("--no-cache", help="Neither keep nor use finished work beside the output."),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output that is there already.")]
 UnitOption = Annotated[Unit | None, typer.Option(help="Unit of the scans' coordinates.")]
 MovedScans = Annotated[list[str], typer.Option(help="The scans, if they have been moved since.")]
@@ -52,6 +57,18 @@ class MeshFormat(StrEnum):
     OBJ = "obj"
     STL = "stl"
     GLB = "glb"
+
+
+@contextmanager
+def without_collecting() -> Iterator[None]:
+    """Collect no garbage for a while: modules make none, and took a sixth longer to import."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def takes(kind: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
@@ -143,6 +160,11 @@ class ShowOptions:
         from scanweld.app.progress import reporting
 
         return reporting(quiet=self.quiet, verbose=self.verbose, as_json=self.as_json)
+
+    def tell(self, line: str) -> None:
+        """Say something to whoever watches a run, before its progress is shown."""
+        if not (self.quiet or self.as_json):
+            typer.echo(line, err=True)
 
     def finish(self, result: "Reconstruction", output: Path) -> None:
         """Print the verdict, and leave with its exit code."""

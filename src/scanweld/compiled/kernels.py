@@ -9,11 +9,15 @@ import atexit
 import contextlib
 import logging
 import os
+import re
 import shutil
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numba import from_dtype, types
 from numba import njit as njit
 from numba.core import config
 from platformdirs import user_cache_path
@@ -22,6 +26,7 @@ from scanweld.compiled.source import PACKAGE, kernel_digest
 
 logger = logging.getLogger(__name__)
 
+_ARGUMENT = re.compile(r"(\w\d)(?:([rw])(\d))?")
 PREFIX = "kernels-"
 NUM_KEPT = 3
 """Folders of other states of the source that are kept, the last used ones,"""
@@ -51,6 +56,29 @@ def provide_cache(chosen: str = "") -> Path:
         folder = _temporary_folder()
     config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # Numba makes it at run time
     return folder
+
+
+def kept_names() -> set[str]:
+    """The last two parts of the names of all kernels that are kept compiled, as ``icp._refine``."""
+    folder = Path(config.CACHE_DIR)  # type: ignore[attr-defined]
+    return {path.name.split("-")[0] for path in folder.rglob("*.nbi")}
+
+
+def types_of(arguments: str) -> tuple[Any, ...]:
+    """Numba's types of a kernel's arguments.
+
+    Args:
+        arguments: As "i8 f4w2": NumPy's letters for the type, then of an array w or r (may be
+            written to, or read only), and how many dimensions it has.
+    """
+    return tuple(_type_of(*found) for found in _ARGUMENT.findall(arguments))
+
+
+def _type_of(letters: str, access: str, dimensions: str) -> Any:
+    scalar = from_dtype(np.dtype(letters))
+    if not access:
+        return scalar
+    return types.Array(scalar, int(dimensions), "C", readonly=access == "r")
 
 
 def _is_writable(folder: Path) -> bool:

@@ -1,12 +1,15 @@
 """Digests of the package's own source: work is kept under them, and done anew when code changes."""
 
-import ast
 import hashlib
+import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
+# Text is searched, as parsing so many files at each start takes longer than most else of it.
+_IMPORT = re.compile(r"^\s*(?:from|import) +([\w.]+)(?: +import +(\([^)]*\)|.*))?", re.MULTILINE)
+_NAME = re.compile(r"\w+")
 
 
 @cache
@@ -53,15 +56,8 @@ def _digest(package: Path, files: Iterable[Path]) -> str:
 
 def _imports(path: Path, package: Path) -> Iterator[Path]:
     """Where the modules are that a file imports by their full names, if they are of the package."""
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.ImportFrom):
-            module = node.module or ""
-            names = [module, *(f"{module}.{alias.name}" for alias in node.names)]
-        elif isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        else:
-            continue
-        for name in names:
+    for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        for name in [module, *(f"{module}.{name}" for name in _NAME.findall(names))]:
             parts = name.split(".")
             if parts[0] == package.name:
                 place = package.joinpath(*parts[1:])

@@ -149,6 +149,7 @@ def _near_surface(
         for piece in range(num):
             first = z + ahead * (2.0 * piece / num - 1.0)
             final = z + ahead * (2.0 * (piece + 1) / num - 1.0)
+            is_same = piece < len(last)
             for axis in range(3):
                 along = m[axis, 0] * a + m[axis, 1] * b
                 if is_pinhole:
@@ -158,10 +159,12 @@ def _near_surface(
                 start = m[axis, 3] - layout[axis]
                 low[axis] = int(np.floor((start + min(p, q) - voxel) / edge))
                 high[axis] = int(np.floor((start + max(p, q) + voxel) / edge))
-            if piece < len(last):
-                if (last[piece, :3] == low).all() and (last[piece, 3:] == high).all():
-                    continue
-                last[piece, :3], last[piece, 3:] = low, high
+                if piece < len(last):
+                    is_same &= last[piece, axis] == low[axis]
+                    is_same &= last[piece, axis + 3] == high[axis]
+                    last[piece, axis], last[piece, axis + 3] = low[axis], high[axis]
+            if is_same:
+                continue
             for i in range(low[0], high[0] + 1):
                 for j in range(low[1], high[1] + 1):
                     for k in range(low[2], high[2] + 1):

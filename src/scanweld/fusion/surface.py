@@ -30,7 +30,7 @@ def extract_surface(
     distance = volume.mean_distance() if distance is None else distance
     beside = np.stack([volume.find(volume.blocks + step) for step in corner_offsets()], axis=1)
     table, corners = triangle_table().reshape(256, -1), edge_corners()
-    sizes = _count(distance, beside, table)
+    sizes = _count(distance, beside, (table >= 0).sum(axis=1) // 3)
     vertices, faces = _march(distance, beside, volume.blocks, table, corners, *sizes)
     return volume.origin + volume.voxel * vertices, faces
 
@@ -65,11 +65,13 @@ def _case(values: SingleArray, i: int, j: int, k: int) -> int:  # pragma: no cov
 
 @njit(cache=True, nogil=True)
 def _count(
-    distance: SingleArray, beside: IntArray, table: IntArray
+    distance: SingleArray, beside: IntArray, per_case: IntArray
 ) -> tuple[int, int]:  # pragma: no cover - compiled
-    """Number of faces, and of edges between voxels that the surface may cross."""
+    """Number of faces, and of edges between voxels that the surface may cross.
+
+    Known is the number of faces in each of the 256 cases.
+    """
     values = np.empty((BLOCK + 1, BLOCK + 1, BLOCK + 1), np.float32)
-    per_case = (table >= 0).sum(axis=1) // 3
     num_faces, num_edges = 0, 0
     for block in range(len(distance)):
         if not _crossed(distance, beside, block, values):

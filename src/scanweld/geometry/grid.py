@@ -29,7 +29,9 @@ def grid_faces(
     Returns:
         (F, 3) indices of points.
     """
-    arrays = np.ascontiguousarray(grid), np.ascontiguousarray(points), np.ascontiguousarray(depth)
+    known = np.ascontiguousarray(grid).view()
+    known.flags.writeable = False  # as frozen grids are: the kernel is then compiled once only
+    arrays = known, np.ascontiguousarray(points), np.ascontiguousarray(depth)
     no_faces = np.empty((0, 3), np.int64)
     faces = np.empty((_find_faces(*arrays, max_step, max_edge, no_faces), 3), np.int64)
     _find_faces(*arrays, max_step, max_edge, faces)

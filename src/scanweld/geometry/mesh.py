@@ -108,7 +108,7 @@ def next_corner(corners: IntArray) -> IntArray:
 
 def pieces(faces: IntArray, num_vertices: int) -> IntArray:
     """The connected piece (V,) of each vertex, from 0; one without a face is a piece by itself."""
-    corners = faces.ravel()
+    corners = faces.flatten()  # those of frozen faces would need a compiled kernel of their own
     return connected(corners, corners[next_corner(np.arange(faces.size))], num_vertices)
 
 

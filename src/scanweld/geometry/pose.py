@@ -68,14 +68,15 @@ class Pose:
         return np.concatenate([w, generator])
 
     def __matmul__(self, other: "Pose") -> "Pose":
-        return Pose(
-            rotation=_straightened(self.rotation @ other.rotation),
-            translation=self.rotation @ other.translation + self.translation,
+        return _made_of_poses(
+            _straightened(self.rotation @ other.rotation),
+            self.rotation @ other.translation + self.translation,
         )
 
     def inverse(self) -> "Pose":
         """The motion back."""
-        return Pose(rotation=self.rotation.T, translation=-self.rotation.T @ self.translation)
+        back = np.ascontiguousarray(self.rotation.T)
+        return _made_of_poses(back, -self.rotation.T @ self.translation)
 
     def apply(self, points: FloatArray) -> FloatArray:
         """Move points (..., 3)."""
@@ -99,6 +100,18 @@ class Pose:
     def shift_at(self, point: FloatArray) -> float:
         """How far the motion moves a point (3,)."""
         return float(np.linalg.norm(self.apply(point) - point))
+
+
+def _made_of_poses(rotation: FloatArray, translation: FloatArray) -> Pose:
+    """A pose of arrays of its own, not looked at again: to check them takes longer than a product.
+
+    What is made of rotations is one; and poses are made by the hundred thousand.
+    """
+    pose = object.__new__(Pose)
+    for name, values in (("rotation", rotation), ("translation", translation)):
+        values.flags.writeable = False
+        object.__setattr__(pose, name, values)
+    return pose
 
 
 def nearest_rotation(matrix: FloatArray) -> FloatArray:

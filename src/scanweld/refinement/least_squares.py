@@ -1,6 +1,6 @@
 """The normal equations of all poses: matches to robustly weighted terms to a Gauss-Newton step."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +46,7 @@ class Term:
 
 
 def weighted_terms(
-    surface: Sequence[Found],
+    surface: list[Found],
     contour: Sequence[Found],
     poses: Mapping[int, Pose],
     contour_weight: float,
@@ -55,7 +55,8 @@ def weighted_terms(
     """Surface and contour terms, each kind measured by its own spread.
 
     Args:
-        surface: Point-to-plane matches.
+        surface: Point-to-plane matches. The list is emptied as the terms are made of it: of 200
+            scans, either takes half a gigabyte.
         contour: Matches across outlines.
         poses: ``world_from_sensor``.
         contour_weight: Weight of a contour match beside a surface match of the same precision.
@@ -63,9 +64,15 @@ def weighted_terms(
     """
     surface_spread, contour_spread = _spread(surface, noise[0]), _spread(contour, noise[1])
     share = contour_weight * (surface_spread / contour_spread) ** 2 if surface else 1.0
-    return [_term(*found, poses, surface_spread, 1.0) for found in surface] + [
+    return [_term(*found, poses, surface_spread, 1.0) for found in _taken_from(surface)] + [
         _term(*found, poses, contour_spread, share) for found in contour
     ]
+
+
+def _taken_from(found: list[Found]) -> Iterator[Found]:
+    found.reverse()
+    while found:
+        yield found.pop()
 
 
 def move_poses(

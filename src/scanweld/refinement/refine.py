@@ -93,8 +93,12 @@ def refine_poses(
         contour: list[Found] = []
         if outlines is not None and n >= config.num_rounds - contour_rounds:
             contour = outlines.matches(poses, surface)
-        terms = weighted_terms(surface, contour, poses, config.contour_weight, noise)
-        poses, moved = move_poses(terms, poses, lever_arm(diameter), MAX_STEP_DIAMETERS * diameter)
+        poses, moved = move_poses(
+            weighted_terms(surface, contour, poses, config.contour_weight, noise),
+            poses,
+            lever_arm(diameter),
+            MAX_STEP_DIAMETERS * diameter,
+        )
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
     surface = match_surfaces(sources, poses, pairs, config.match_diameters[1] * diameter)

@@ -96,6 +96,7 @@ def estimate_scales(
             return {}
         centres = {k: poses[k].apply(grown[k].points.mean(axis=0)) for k in order}
         twists, steps, spreads = _solve(terms, order, centres, arm)
+        terms.clear()  # those of the next round take as much memory
         middle = np.mean([centres[k] for k in order], axis=0)
         for k, twist, step, spread in zip(order, twists, steps, spreads, strict=True):
             # Grown about the sensor in the next round, it is moved back to where it was.
@@ -140,9 +141,9 @@ def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:
     camera = np.array(source.camera)
     if camera[0] != 0.0:
         camera[1:3] /= factor
-    return replace(
-        source, points=factor * source.points, depth=factor * source.depth, camera=camera
-    )
+    depth = factor * source.depth
+    depth.flags.writeable = False  # as that of scans is: the kernel is then compiled once only
+    return replace(source, points=factor * source.points, depth=depth, camera=camera)
 
 
 def _surface_terms(

@@ -26,6 +26,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 CONNECT_SECONDS = 10
+WAIT_SECONDS = 60
+"""How long a cluster may be without workers: those that died may be replaced."""
 _LIBRARIES = ("numba", "numpy", "scipy")
 """Another version of these may round differently."""
 
@@ -94,7 +96,8 @@ class Cluster:
         """See ``Runner``.
 
         Raises:
-            InputError: If the scheduler is lost, or a piece of work kills every worker.
+            InputError: If the scheduler is lost, a piece of work kills every worker, or none is
+                left.
         """
         ours = versions()
         left = deque(
@@ -103,7 +106,7 @@ class Cluster:
         )
         try:
             while left:
-                yield left.popleft().result()
+                yield self._result(left.popleft())
         except self._lost as error:
             raise InputError(
                 f"{self._address}: the scheduler was lost; run again, and what is finished is not "
@@ -116,6 +119,22 @@ class Cluster:
             ) from error
         finally:
             left.clear()  # what nobody waits for is not done
+
+    def _result(self, future: Any) -> Any:
+        """The result of a piece of work, once it is there."""
+        without_workers = 0
+        while without_workers < WAIT_SECONDS:
+            try:
+                return future.result(timeout=1)
+            except TimeoutError:
+                if future.done():
+                    return future.result()
+                has_workers = bool(self._client.scheduler_info()["workers"])
+                without_workers = 0 if has_workers else without_workers + 1
+        raise InputError(
+            f"{self._address}: all workers of the cluster are gone; start some by 'dask worker "
+            f"{self._address}' and run again: what is finished is not done again"
+        )
 
     def _held(self, shared: Shared[Item] | None, item: Item) -> list[Any]:
         """The parts that an item needs, on the cluster; each is sent once."""

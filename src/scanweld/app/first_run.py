@@ -1,0 +1,123 @@
+"""The first run after installation: other processes compile kernels before the run needs them.
+
+Compiling holds the interpreter's lock, so threads would gain nothing. The others begin with what a
+run needs last, and the run itself compiles what it comes to and does not find: they meet midway.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from scanweld.work.threads import num_workers
+
+MAX_PROCESSES = 4
+"""Processes that compile, the run among them: more would wait for the longest of the kernels."""
+SECONDS_A_KERNEL = 0.6
+"""CPU time to compile one, of about 2.4 GHz."""
+
+KERNELS = {
+    "io.ply_body._find_lists": "u1r1 i8 i8 i8w2 b1",
+    "io.ply_body._octets_of_lists": "u1r1 i8w1 i8w1",
+    "geometry.buckets.into_buckets": "f8w2 f8",
+    "geometry.buckets.are_beside": "f8w2 i8w1 i8w1 f8 i8",
+    "geometry.grid._find_faces": "i8r2 f8w2 f8w1 f8 f8 i8w2",
+    "geometry.rasterize._fill": "f8w2 f8w1 i8w2 b1 f8w2 i8w2",
+    "preparation.denoise._fit_planes": "f8w2 i8 f8 f8",
+    "geometry.mesh.connected": "i8w1 i8w1 i8",
+    "geometry.mesh._normals": "f8w2 i8w2 i8",
+    "geometry.mesh.corners_at": "i8w2 i8",
+    "geometry.mesh._opposite_edges": "i8w2 i8w1 i8w1",
+    "preparation.sampling._farthest": "f8w2 i8 i8 f8",
+    "pairs.hypotheses._score_all": "f4w3 f4w1 f4w3 f4w3 f4w4 f4w2 f4w3 f4w1 f4w3 f4w3 f4w4 f4w2 "
+    "f4w1 f8w2 f4 f4w3",
+    "pairs.distinct.distinct_poses": "f8w2 f8w1 f8 f8 i8",
+    "evidence.icp._refine_all": "f8w2 f8w2 f8w2 i4w3 f8w1 f8w2 f8w2 f8w2 i4w3 f8w1 f8w2 f8w1 i8 "
+    "f8w1 f8",
+    "evidence.visibility.count_evidence": "f8w1 f4w3 f8w2 f8w2 f8w1 f4w3 f8w2 f8w2 f8w2 i8 f8",
+    "refinement.surface_terms._closest_planes": "f8w2 f8w2 f8w1 f8r2 f8r3 b1w2 f8 f8w2 f8w1",
+    "fusion.sampling._sample": "f8w2 f8w2 f8 f8w2 f8w1 f4w2 f4w3 f4w2 b1w2 f4w1 f4w1",
+    "fusion.integrate._near_surface": "f8w1 f4w2 f4w3 f4w2 f8w2 f8w1",
+    "fusion.integrate._tile_ends": "f8w1 f4w2 f4w3 f4w2 f8",
+    "fusion.integrate._tile_ends_of_free": "b1w2",
+    "fusion.integrate._integrate_image": "f4w4 f4w4 f4w4 i8w2 f8w1 f8w2 f8w1 f4w2 f4w3 f4w2 b1w2 "
+    "f8 f4w2 f8w1 b1w2 f8 f4w2",
+    "fusion.volume._fill_pinholes": "f4w4 f4w4 i8w2 f8 f4w4",
+    "fusion.surface._count": "f4w4 i8w2 i8w1",
+    "fusion.surface._march": "f4w4 i8w2 i8w2 i8r2 i8w2 i8 i8",
+    "fusion.finish._is_back_to_back": "i8w2 i8w1 i8w1",
+    "fusion.sheets._find_opposite": "f8w2 f8w2 i8w1 i8w1",
+    "fusion.sheets._hang_together": "i8w1 i8w1 i8w2 i8w1 i8w1",
+    "fusion.sampling._sample_colors": "f8w2 f8w1 u1w3 f4w2 b1w2 f4w2 f4w1",
+    "geometry.shading._shade": "i8w2 f8w2 i8w2 f8w1 b1 u1w2 f8w1 f8w1 f8w3 i8w2",
+}
+"""What a usual run calls, in the order of its first calls, and with what (see ``types_of``)."""
+
+
+def missing_kernels() -> list[str]:
+    """Those of the kernels that have not been compiled yet, in the order of their first calls."""
+    from scanweld.compiled.kernels import kept_names
+
+    kept = kept_names()
+    return [name for name in KERNELS if ".".join(name.split(".")[-2:]) not in kept]
+
+
+@contextmanager
+def compiling_ahead(tell: Callable[[str], object], workers: int | None = None) -> Iterator[None]:
+    """Let other processes compile what is missing for as long as the context lasts.
+
+    Args:
+        tell: Called with a line on it, if anything is missing.
+        workers: Processes, this one among them; as many as there are cores if None.
+    """
+    missing = missing_kernels()
+    count = min(num_workers(workers), MAX_PROCESSES)
+    if not missing or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        yield
+        return
+    seconds = SECONDS_A_KERNEL * len(missing) / count
+    tell(f"first run: {len(missing)} kernels are compiled, once; that takes some {seconds:.0f} s")
+    others = [_start(missing[::-1][k :: count - 1]) for k in range(count - 1)]
+    try:
+        yield
+    finally:
+        for process in others:
+            process.terminate()
+            process.wait()
+
+
+def _start(names: Sequence[str]) -> subprocess.Popen[bytes]:
+    # A session of its own, else it would have its say when a run is interrupted at the keyboard.
+    return subprocess.Popen(
+        [sys.executable, "-m", "scanweld.app.first_run", *names],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def kernel(name: str) -> Any:
+    """A compiled function, by its name in the table."""
+    module, _, function = name.rpartition(".")
+    return getattr(import_module(f"scanweld.{module}"), function)
+
+
+def argument_types(name: str) -> tuple[Any, ...]:
+    """The types of a kernel's arguments, by its name in the table."""
+    from scanweld.compiled.kernels import types_of
+
+    return types_of(KERNELS[name])
+
+
+def main(names: Sequence[str]) -> None:
+    """Compile kernels, one after the other, into the folder where they are kept."""
+    for name in names:
+        kernel(name).compile(argument_types(name))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
