@@ -8,6 +8,7 @@ from typing import Any
 from scanweld.app.json_text import json_text
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, natural_key, write_mesh_ply, write_poses, write_whole
+from scanweld.io.local_origin import find_shift
 from scanweld.reconstruction import PairReport, Reconstruction
 from scanweld.work.stage_log import StageReport
 
@@ -59,6 +60,7 @@ def report_json(
     files = files or {}
     names = sorted(result.scans, key=natural_key)
     facts = [asdict(fact) for fact in result.knowledge]
+    shift = None if result.mesh is None else find_shift(result.mesh.vertices)
     return {
         "format": FORMAT,
         "verdict": result.verdict.value,
@@ -66,6 +68,7 @@ def report_json(
         "reasons": list(result.reasons),
         **({"knowledge": facts} if facts else {}),
         **({} if max_points is None else {"max_points": max_points}),
+        **({} if shift is None else {"shift": shift.tolist()}),
         "scans": {name: asdict(result.scans[name]) | {"file": files.get(name)} for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from scanweld.io import natural_key
+from scanweld.io.local_origin import about_note, find_shift
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 
 
@@ -23,6 +24,9 @@ def summary(result: Reconstruction, output: Path) -> str:
     lines += _least_sure(result)
     if result.poses and result.mesh is None:
         lines.append("  no model: the placed scans could not be fused")
+    shift = None if result.mesh is None else find_shift(result.mesh.vertices)
+    if shift is not None:
+        lines.append(f"  {about_note(['model.ply'], shift)}")
     lines.append(f"  {output}: {', '.join(_files(result))}")
     return "\n".join(lines)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
+from scanweld.io.local_origin import shifted
 from scanweld.io.pose_formats.colmap import IMAGE_SUFFIX, PIXEL_CENTRE
 from scanweld.io.pose_formats.records import Frame, PosedScan, PoseEntries, parse_pose
 from scanweld.io.poses import load_json
@@ -21,6 +22,8 @@ from scanweld.io.poses import load_json
 TITLE = "nerfstudio"
 _SENSOR_FROM_OPENGL = Pose(rotation=np.diag([1.0, -1.0, -1.0]), translation=np.zeros(3))
 _FOLDER = "images/"
+_SHIFT = "shift"
+"""Our key of the local origin that the world is about where it lies far off."""
 
 
 def recognise_json(content: dict[str, Any]) -> bool:
@@ -34,10 +37,15 @@ def read(path: Path, text: str) -> PoseEntries:
     Raises:
         ReadError: If a frame has no name, or its matrix is not a rigid motion.
     """
-    frames = load_json(path, text).get("frames")
+    content = load_json(path, text)
+    frames, shift = content.get("frames"), content.get(_SHIFT, [0.0, 0.0, 0.0])
     if not isinstance(frames, list):
         raise ReadError(f"{path}: has no list of frames; write it anew")
-    entries = tuple(_entry(path, k, frame) for k, frame in enumerate(frames))
+    if not isinstance(shift, list) or not _are_three_numbers(shift):
+        raise ReadError(f"{path}: its {_SHIFT} is not three numbers; correct or remove it")
+    origin = np.array(shift, dtype=np.float64)
+    found = [_entry(path, k, frame) for k, frame in enumerate(frames)]
+    entries = tuple((name, shifted(pose, origin)) for name, pose in found)
     return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=entries)
 
 
@@ -49,6 +57,8 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
     """
     frames = [_frame(scan) for scan in scans]
     content = {"camera_model": "OPENCV", "frames": frames}
+    if scans and scans[0].shift is not None:
+        content[_SHIFT] = scans[0].shift.tolist()
     return {"transforms.json": json.dumps(content, indent=1) + "\n"}
 
 
@@ -65,6 +75,11 @@ def _frame(scan: PosedScan) -> dict[str, Any]:
         "h": camera.height,
         "transform_matrix": (world_from_opengl.matrix() + 0.0).tolist(),
     }
+
+
+def _are_three_numbers(values: Sequence[Any]) -> bool:
+    largest = float(np.finfo(np.float64).max)
+    return len(values) == 3 and all(type(x) in (int, float) and abs(x) < largest for x in values)
 
 
 def _entry(path: Path, k: int, frame: Any) -> tuple[str, Pose]:

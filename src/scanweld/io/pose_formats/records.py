@@ -5,9 +5,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+import numpy as np
+
 from scanweld.errors import InputError, ReadError, WriteError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
+from scanweld.io.local_origin import SHIFT_KEY, shift_text, shifted, told_shift
 from scanweld.io.matrices import pose_from_numbers
 
 
@@ -28,6 +32,7 @@ class PosedScan:
         file: Path of its file, as seen from where the poses go; None where no format asks for it.
         camera: Of its sensor; likewise None.
         scan_from_sensor: Where the sensor stood; likewise None.
+        shift: The local origin (3,) of a world that lies far off; None where it does not.
     """
 
     name: str
@@ -35,6 +40,7 @@ class PosedScan:
     file: str | None = None
     camera: Camera | None = None
     scan_from_sensor: Pose | None = None
+    shift: FloatArray | None = None
 
     def known_file(self) -> str:
         """The path of the scan's file.
@@ -58,14 +64,15 @@ class PosedScan:
         return require_pinhole(self.name, self.camera, title)
 
     def world_from_sensor(self) -> Pose:
-        """The pose of the scan's sensor: x right, y down, z away.
+        """The pose of the scan's sensor: x right, y down, z away; about the local origin, if any.
 
         Raises:
             InputError: If it is unknown where the sensor stood.
         """
         if self.scan_from_sensor is None:
             raise InputError(f"{self.name}: it is unknown where its sensor stood")
-        return self.world_from_scan @ self.scan_from_sensor
+        pose = self.world_from_scan @ self.scan_from_sensor
+        return pose if self.shift is None else shifted(pose, -self.shift)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -123,6 +130,27 @@ def refuse_characters(
                 f"{printed(scan.name)}: {title} cannot hold {what} in {text!r}; rename the scan's "
                 "file or choose another format"
             )
+
+
+def shift_lines(scans: Sequence[PosedScan]) -> list[str]:
+    """The comment that tells the local origin of the sensors' poses, if they have one."""
+    shifts = [scan.shift for scan in scans[:1] if scan.shift is not None]
+    return [f"# {shift_text(shift)}" for shift in shifts]
+
+
+def read_shift(path: Path, text: str) -> FloatArray:
+    """The local origin (3,) that such a comment tells; zero without one.
+
+    Raises:
+        ReadError: If it is no three numbers.
+    """
+    try:
+        shift = told_shift(text.encode())
+    except ValueError as error:
+        raise ReadError(
+            f"{path}: its {SHIFT_KEY} is not three numbers ({error}); correct or remove it"
+        ) from error
+    return np.zeros(3) if shift is None else shift
 
 
 def printed(name: str) -> str:
