@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -489,6 +490,53 @@ def test_scans_without_a_pose_are_left_out_and_named(
     assert "partial: 3 of 4 scans" in told and "unplaced scan_04: no pose in some.json" in told
     assert read_poses("fused/poses.json").unplaced == {"scan_04": "no pose in some.json"}
     assert set(read_poses("fused/poses.json").poses) == set(NAMES[:3])
+
+
+BROKEN = {  # a file of poses -> what stands before a number without which one pose is none
+    "poses.json": r'"scan_02": \[\s*\[',
+    "poses.conf": r"scan_02.ply \S+ \S+ \S+ ",
+    "poses.mlp": r'scan_02.ply" visible="1">\s*<MLMatrix44>\s*',
+    "poses.aln": r"scan_02.ply\n#\n",
+    "poses.tum.txt": r"\n1 \S+ \S+ \S+ ",
+    "colmap/images.txt": r"\n2 ",
+    "posegraph.json": r'"pose": \[\s*',
+    "cloudcompare/scan_02.txt": "",
+    "transforms.json": r'scan_02.png"[^[]*\[\s*\[\s*',
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_one_broken_matrix_leaves_out_its_scan_alone(
+    model: Path, scene: Scene, name: str, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(fuse_module, "fuse", lambda *_, **__: scene.mesh)
+    monkeypatch.setattr(fuse_module, "write_html_report", lambda *_: None)
+    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
+    shutil.copy(model / "poses.json", "out/poses.json")
+    path = Path("out") / name
+    text = path.read_text(encoding="utf-8")
+    path.write_text(
+        re.sub(f"({BROKEN[name]})[-.0-9e]+", r"\g<1>9", text, count=1), encoding="utf-8"
+    )
+    given = path.parent if "cloudcompare" in name else path
+    assert scanweld(*FUSE, "--poses", given, "-o", "fused", "-q") == 3
+    found = read_poses("fused/poses.json")
+    (left_out,) = found.unplaced
+    assert set(found.poses) == set(NAMES) - {left_out}
+    assert left_out == ("scan_01" if name == "posegraph.json" else "scan_02")
+    assert path.name in found.unplaced[left_out]
+
+
+def test_a_sensor_of_which_the_poses_cannot_speak_leaves_out_its_scan(
+    model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
+):
+    assert scanweld("export", model, "--poses", "colmap", "-o", "out") == 0
+    turned = view_of(box(), 20, 25, pixels=70, model=CameraModel.ORTHOGRAPHIC)
+    write_scans(Path("scans"), scene_of(box(), [turned]).scans)
+    capsys.readouterr()
+    assert scanweld(*FUSE, "--poses", "out/colmap", "-o", "fused", "-q") == 3
+    assert "unplaced scan_01: scan_01: its sensor is orthographic" in capsys.readouterr().out
+    assert set(read_poses("fused/poses.json").poses) == set(NAMES[1:])
 
 
 @pytest.mark.parametrize(

@@ -11,14 +11,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld.errors import ReadError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.io.local_origin import shifted
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion, quaternion
 from scanweld.io.pose_formats.records import (
+    Entry,
     Frame,
     PosedScan,
     PoseEntries,
     are_numbers,
+    attempt,
     number,
     parse_numbers,
     read_shift,
@@ -46,7 +49,7 @@ def read(path: Path, text: str) -> PoseEntries:
         ReadError: If a line is broken.
     """
     origin = read_shift(path, text)
-    entries: list[tuple[str | None, Pose]] = []
+    entries: list[Entry] = []
     lines = enumerate(text.splitlines(), start=1)
     for count, line in lines:
         if not _is_data(line):
@@ -54,9 +57,7 @@ def read(path: Path, text: str) -> PoseEntries:
         words = line.split(maxsplit=9)
         if len(words) < 10:
             raise ReadError(f"{path}: line {count}: not an image with its pose; export it anew")
-        qw, qx, qy, qz, *shift = parse_numbers(path, f"line {count}", words[1:8])
-        camera_from_world = pose_from_quaternion(path, f"line {count}", (qx, qy, qz, qw), shift)
-        entries.append((words[9].strip(), shifted(camera_from_world.inverse(), origin)))
+        entries.append((words[9].strip(), attempt(_pose, path, count, words[1:8], origin)))
         next(lines, None)  # the keypoints, a line that may be empty
     return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=tuple(entries))
 
@@ -89,6 +90,12 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
         "colmap/cameras.txt": "\n".join(cameras) + "\n",
         "colmap/points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[]: none\n",
     }
+
+
+def _pose(path: Path, line: int, words: Sequence[str], origin: FloatArray) -> Pose:
+    qw, qx, qy, qz, *shift = parse_numbers(path, f"line {line}", words)
+    camera_from_world = pose_from_quaternion(path, f"line {line}", (qx, qy, qz, qw), shift)
+    return shifted(camera_from_world.inverse(), origin)
 
 
 def _is_data(line: str) -> bool:

@@ -13,10 +13,18 @@ from typing import Any
 import numpy as np
 
 from scanweld.errors import ReadError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.io.local_origin import shifted
 from scanweld.io.pose_formats.colmap import IMAGE_SUFFIX, PIXEL_CENTRE
-from scanweld.io.pose_formats.records import Frame, PosedScan, PoseEntries, parse_pose
+from scanweld.io.pose_formats.records import (
+    Entry,
+    Frame,
+    PosedScan,
+    PoseEntries,
+    attempt,
+    parse_pose,
+)
 from scanweld.io.poses import load_json
 
 TITLE = "nerfstudio"
@@ -44,8 +52,7 @@ def read(path: Path, text: str) -> PoseEntries:
     if not isinstance(shift, list) or not _are_three_numbers(shift):
         raise ReadError(f"{path}: its {_SHIFT} is not three numbers; correct or remove it")
     origin = np.array(shift, dtype=np.float64)
-    found = [_entry(path, k, frame) for k, frame in enumerate(frames)]
-    entries = tuple((name, shifted(pose, origin)) for name, pose in found)
+    entries = tuple(_entry(path, k, frame, origin) for k, frame in enumerate(frames))
     return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=entries)
 
 
@@ -82,13 +89,17 @@ def _are_three_numbers(values: Sequence[Any]) -> bool:
     return len(values) == 3 and all(type(x) in (int, float) and abs(x) < largest for x in values)
 
 
-def _entry(path: Path, k: int, frame: Any) -> tuple[str, Pose]:
+def _entry(path: Path, k: int, frame: Any, origin: FloatArray) -> Entry:
     name = frame.get("file_path") if isinstance(frame, dict) else None
     rows = frame.get("transform_matrix") if isinstance(frame, dict) else None
     if not isinstance(name, str) or not isinstance(rows, list):
         raise ReadError(f"{path}: frame {k}: lacks file_path or transform_matrix; write it anew")
+    pose = attempt(_pose, path, name, rows, origin)
+    return name.removeprefix("./").removeprefix(_FOLDER), pose
+
+
+def _pose(path: Path, name: str, rows: Sequence[Any], origin: FloatArray) -> Pose:
     flat = [x for row in rows for x in (row if isinstance(row, list) else [row])]
     if not all(type(x) in (int, float) for x in flat):
         raise ReadError(f"{path}: {name}: the matrix holds what is no number; write it anew")
-    pose = parse_pose(path, name, flat)
-    return name.removeprefix("./").removeprefix(_FOLDER), pose @ _SENSOR_FROM_OPENGL.inverse()
+    return shifted(parse_pose(path, name, flat) @ _SENSOR_FROM_OPENGL.inverse(), origin)

@@ -1,9 +1,10 @@
 """What all formats of poses share: posed scans to write, and what was read from a file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from typing import ParamSpec
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.io.local_origin import SHIFT_KEY, shift_text, shifted, told_shift
 from scanweld.io.matrices import pose_from_numbers
+
+Entry = tuple[str | None, Pose | ReadError]
+Arguments = ParamSpec("Arguments")
 
 
 class Frame(StrEnum):
@@ -82,14 +86,14 @@ class PoseEntries:
     Attributes:
         title: Of its format.
         frame: Whether its poses are world_from_scan or world_from_sensor.
-        entries: What the file calls each scan, and its pose; None where the format has no names,
-            so that the scans come in natural order.
+        entries: What the file calls each scan, and its pose, or what is wrong with that; None where
+            the format has no names, so that the scans come in natural order.
         are_paths: Whether scans are called by paths of files, rather than by name.
     """
 
     title: str
     frame: Frame
-    entries: tuple[tuple[str | None, Pose], ...]
+    entries: tuple[Entry, ...]
     are_paths: bool = True
 
 
@@ -158,6 +162,16 @@ def printed(name: str) -> str:
     return name if name.isprintable() else repr(name)
 
 
+def attempt(
+    read: Callable[Arguments, Pose], *args: Arguments.args, **kwargs: Arguments.kwargs
+) -> Pose | ReadError:
+    """The pose of one scan, or why it cannot be read, which leaves those of the others."""
+    try:
+        return read(*args, **kwargs)
+    except ReadError as error:
+        return error
+
+
 def parse_pose(path: Path, where: str, numbers: Sequence[float]) -> Pose:
     """The pose of the 16 numbers of a matrix, row after row.
 
@@ -168,6 +182,15 @@ def parse_pose(path: Path, where: str, numbers: Sequence[float]) -> Pose:
         return pose_from_numbers(numbers)
     except (ValueError, OverflowError) as error:
         raise ReadError(f"{path}: {where}: {error}; correct the file or write it anew") from error
+
+
+def parse_words(path: Path, where: str, words: Sequence[str]) -> Pose:
+    """The pose of the 16 numbers of a matrix in words, row after row.
+
+    Raises:
+        ReadError: If they are no numbers, or not a rigid motion.
+    """
+    return parse_pose(path, where, parse_numbers(path, where, words))
 
 
 def parse_numbers(path: Path, where: str, words: Sequence[str]) -> list[float]:

@@ -11,14 +11,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld.errors import ReadError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.io.local_origin import shifted
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion, quaternion
 from scanweld.io.pose_formats.records import (
+    Entry,
     Frame,
     PosedScan,
     PoseEntries,
     are_numbers,
+    attempt,
     number,
     parse_numbers,
     read_shift,
@@ -46,14 +49,12 @@ def read(path: Path, text: str) -> PoseEntries:
     told = [_NAME.fullmatch(line) for line in text.splitlines()]
     names: dict[str, str] = {match[1]: match[2] for match in told if match}
     shift = read_shift(path, text)
-    entries: list[tuple[str | None, Pose]] = []
+    entries: list[Entry] = []
     for count, line in _rows(text):
         words = line.split()
         if len(words) != 8:
             raise ReadError(f"{path}: line {count}: {len(words)} numbers instead of 8; correct it")
-        _, x, y, z, *xyzw = parse_numbers(path, f"line {count}", words)
-        pose = pose_from_quaternion(path, f"line {count}", xyzw, (x, y, z))
-        entries.append((names.get(words[0]), shifted(pose, shift)))
+        entries.append((names.get(words[0]), attempt(_pose, path, count, words, shift)))
     if any(name is None for name, _ in entries):
         entries = [(None, pose) for _, pose in entries]
     return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=tuple(entries), are_paths=False)
@@ -74,6 +75,11 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
         numbers = (*pose.translation, *quaternion(pose.rotation))
         lines += [f"# {k} = {scan.name}", f"{k} {' '.join(number(x) for x in numbers)}"]
     return {"poses.tum.txt": "\n".join(lines) + "\n"}
+
+
+def _pose(path: Path, line: int, words: Sequence[str], shift: FloatArray) -> Pose:
+    _, x, y, z, *xyzw = parse_numbers(path, f"line {line}", words)
+    return shifted(pose_from_quaternion(path, f"line {line}", xyzw, (x, y, z)), shift)
 
 
 def _rows(text: str) -> list[tuple[int, str]]:
