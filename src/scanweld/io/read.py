@@ -9,6 +9,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.local_origin import SHIFT_KEY, told_shift
 from scanweld.io.mesh_formats import read_obj, read_off, read_stl
+from scanweld.io.not_scans import why_unread
 from scanweld.io.ply import read_ply
 from scanweld.io.raw import RawScan, to_mesh, to_scan
 from scanweld.io.xyz import read_xyz
@@ -49,7 +50,7 @@ def read_mesh(path: Path | str) -> TriangleMesh:
 def _read(path: Path) -> RawScan:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ReadError(f"{path}: unknown format; scanweld reads {', '.join(READERS)}")
+        raise ReadError(why_unread(path, READERS))
     try:
         data = path.read_bytes()
     except OSError as error:
