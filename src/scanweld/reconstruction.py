@@ -180,6 +180,7 @@ class Reconstruction:
         pairs: Report of every pair, ordered by names.
         mesh: Fused surface of the largest component, in its frame; None if nothing was placed, or
             what was placed could not be fused.
+        preview: The same of doubtful scans, where all of that component are: to look at, no model.
         verdict: The whole in one word.
         reasons: Why it is not good, in sentences.
         stages: Time and memory per stage, in the order of the run.
@@ -199,4 +200,5 @@ class Reconstruction:
     stages: Mapping[str, StageReport]
     config: Config
     knowledge: tuple[FactReport, ...] = ()
+    preview: TriangleMesh | None = None
     prepared: Mapping[str, PreparedScan] = field(default_factory=dict)

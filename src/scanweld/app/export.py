@@ -8,6 +8,7 @@ import numpy as np
 
 from scanweld.app.model_folder import ModelFolder, open_model
 from scanweld.app.options import Wanted
+from scanweld.app.outputs import PREVIEW
 from scanweld.app.workspace import Workspace
 from scanweld.errors import InputError, ReadError, ScanweldError
 from scanweld.geometry.arrays import FloatArray
@@ -247,7 +248,9 @@ def _posed(
 def _model(model: ModelFolder, name: str, wanted: Wanted) -> bytes:
     mesh = model.mesh
     if mesh is None:
-        raise InputError(f"{model.path}: holds no model.ply, so there is no model to export")
+        doubtful = (model.path / PREVIEW).is_file()
+        told = f"; {PREVIEW} is of doubtful scans, which are no model" if doubtful else ""
+        raise InputError(f"{model.path}: holds no model.ply, so there is no model to export{told}")
     if name == "ply":
         return model.mesh_path.read_bytes()
     writers: dict[str, Callable[[TriangleMesh], bytes]] = {

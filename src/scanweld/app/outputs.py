@@ -1,4 +1,4 @@
-"""What a run writes: poses.json, graph.json, report.json, config.toml and model.ply."""
+"""What a run writes: poses.json, graph.json, report.json, config.toml, model.ply or preview.ply."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -13,6 +13,8 @@ from scanweld.reconstruction import PairReport, Reconstruction
 from scanweld.work.stage_log import StageReport
 
 FORMAT = 1
+PREVIEW = "preview.ply"
+PREVIEW_COMMENT = "preview of doubtful scans, not a model: their poses may be wrong"
 
 Json = Mapping[str, Any]
 
@@ -27,7 +29,8 @@ def write_outputs(
 
     Args:
         result: What the run found out.
-        folder: An existing folder. There is no model.ply where there is no mesh.
+        folder: An existing folder. There is no model.ply where there is no mesh, but preview.ply
+            where all scans are doubtful.
         files: Where each scan's file is, as seen from the folder's final place.
         max_points: To how many points scans were thinned at most, if they were.
 
@@ -44,6 +47,8 @@ def write_outputs(
     write_whole(folder / "config.toml", result.config.to_toml().encode())
     if result.mesh is not None:
         write_mesh_ply(folder / "model.ply", result.mesh)
+    if result.preview is not None:
+        write_mesh_ply(folder / PREVIEW, result.preview, [PREVIEW_COMMENT])
 
 
 def graph_json(result: Reconstruction) -> Json:
@@ -60,7 +65,8 @@ def report_json(
     files = files or {}
     names = sorted(result.scans, key=natural_key)
     facts = [asdict(fact) for fact in result.knowledge]
-    shift = None if result.mesh is None else find_shift(result.mesh.vertices)
+    mesh = result.mesh or result.preview
+    shift = None if mesh is None else find_shift(mesh.vertices)
     return {
         "format": FORMAT,
         "verdict": result.verdict.value,
@@ -69,6 +75,7 @@ def report_json(
         **({"knowledge": facts} if facts else {}),
         **({} if max_points is None else {"max_points": max_points}),
         **({} if shift is None else {"shift": shift.tolist()}),
+        **({} if result.preview is None else {"preview": PREVIEW}),
         "scans": {name: asdict(result.scans[name]) | {"file": files.get(name)} for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),

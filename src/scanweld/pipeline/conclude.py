@@ -260,6 +260,7 @@ def _verdict(
     if not graph.components:
         told = ("no two scans could be registered to each other", *why_open(graph), *denied)
         return Verdict.NOTHING, told
+    largest = graph.components[0]
     by_verdict = {
         kind: [name for name, scan in sorted(scans.items()) if scan.verdict is kind]
         for kind in ScanVerdict
@@ -273,7 +274,9 @@ def _verdict(
     if len(graph.components) > 1:
         sizes = ", ".join(str(len(component.poses)) for component in graph.components)
         reasons.append(f"the scans fall into {len(graph.components)} components of {sizes} scans")
-    if mesh is None:
+    if not config.fusion.with_doubtful and largest.poses.keys() <= graph.doubts.keys():
+        reasons.append("no model: all scans that it would be made of are doubtful")
+    elif mesh is None:
         reasons.append("the placed scans could not be fused into a model")
     reasons += why_open(graph)
     reasons += denied

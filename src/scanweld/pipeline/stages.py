@@ -1,6 +1,7 @@
 """The stages of a run, one after the other."""
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 
 from scanweld.confidence.assess import Confidence, assess
@@ -147,28 +148,51 @@ def fuse_largest(
     """The surface of the largest component's good scans, in its world; None without."""
     if not graph.components:
         return None
-    component = graph.components[0]
     left_out = set() if config.fusion.with_doubtful else set(graph.doubts)
-    order = sorted(set(component.poses) - left_out)
-    prepared = intake.prepared
+    order = sorted(set(graph.components[0].poses) - left_out)
     if not order:
         logger.warning("no model: all of its scans are doubtful")
         return None
+    with stages.stage("fuse") as counts:
+        mesh = _surface_of(order, intake, graph, config, stages)
+        if mesh is not None:
+            counts["faces"] = len(mesh.faces)
+    return mesh
+
+
+def preview_largest(
+    intake: Intake, graph: ViewGraph, config: Config, stages: Stages
+) -> TriangleMesh | None:
+    """The same of doubtful scans where all are doubtful, to look at; None where one is not."""
+    if not graph.components or config.fusion.with_doubtful:
+        return None
+    placed = set(graph.components[0].poses)
+    if placed - set(graph.doubts):
+        return None
+    with stages.stage("preview") as counts:
+        mesh = _surface_of(sorted(placed), intake, graph, config, stages)
+        if mesh is not None:
+            counts["faces"] = len(mesh.faces)
+    return mesh
+
+
+def _surface_of(
+    order: Sequence[int], intake: Intake, graph: ViewGraph, config: Config, stages: Stages
+) -> TriangleMesh | None:
+    """The surface of some scans of the largest component; None where they cannot be fused."""
+    component, prepared = graph.components[0], intake.prepared
     world_from_reference = component.world_from_reference(
         prepared[component.reference].scan_from_sensor
     )
-    with stages.stage("fuse") as counts:
-        try:
-            mesh = fuse(
-                [prepared[k] for k in order],
-                [world_from_reference @ component.poses[k] for k in order],
-                config.fusion,
-                prepare=config.prepare,
-                workers=stages.workers,
-                cache=stages.cache,
-            )
-        except InputError as error:
-            logger.warning("no model: %s", error)
-            return None
-        counts["faces"] = len(mesh.faces)
-    return mesh
+    try:
+        return fuse(
+            [prepared[k] for k in order],
+            [world_from_reference @ component.poses[k] for k in order],
+            config.fusion,
+            prepare=config.prepare,
+            workers=stages.workers,
+            cache=stages.cache,
+        )
+    except InputError as error:
+        logger.warning("no model: %s", error)
+        return None
