@@ -292,10 +292,8 @@ def test_scans_that_moved_are_found_where_said(model: Path, capsys: pytest.Captu
     assert scanweld(*export, "--model", "stl", "-o", "rest") == 3
     told = capsys.readouterr().out.splitlines()
     assert told[0] == "rest: posegraph.json, model.stl"
-    assert [line.split(" (")[0] for line in told[1:]] == [
-        f"left out of TUM, Stanford .conf: {name}: its file is not where the model says"
-        for name in NAMES
-    ]
+    assert told[1].startswith("left out TUM, Stanford .conf: scan_01: its file is not where")
+    assert len(told) == 2 and told[1].endswith("(3 more scans likewise)")
     shutil.copytree("moved", "scans")
     Path("scans/scan_03.ply").unlink()
     capsys.readouterr()
@@ -326,8 +324,9 @@ def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[
     for form in ("tum", "colmap", "nerfstudio"):
         assert scanweld("export", model, "--poses", "mlp", "--poses", form, "-o", form) == 3
         told = capsys.readouterr().out.splitlines()
-        assert told[0] == f"{form}: poses.mlp" and len(told) == 5
-        assert "scan_04: its sensor is orthographic" in told[4]
+        assert told[0] == f"{form}: poses.mlp" and len(told) == 2
+        assert re.match("left out .*: scan_01: its sensor is orthographic", told[1])
+        assert told[1].endswith("(3 more scans likewise)")
     Path("tum.txt").write_text("".join(f"{k} 0 0 0 0 0 0 1\n" for k in range(4)))
     assert scanweld("fuse", "scans", "--poses", "tum.txt", "-o", "fused", "-q") == 1
     assert "its sensor is orthographic, and TUM speaks of pinholes only" in error_line(capsys)
@@ -377,7 +376,7 @@ def test_a_missing_model_leaves_the_rest(model: Path, capsys: pytest.CaptureFixt
     assert scanweld("export", model, "--poses", "mlp", "--model", "glb", "-o", "out") == 3
     told = capsys.readouterr().out.splitlines()
     assert told[0] == "out: poses.mlp"
-    assert told[1].startswith("left out of model.glb: ") and "holds no model.ply" in told[1]
+    assert told[1].startswith("left out model.glb: ") and "holds no model.ply" in told[1]
 
 
 def test_no_output_is_replaced_unasked_and_no_input_ever(

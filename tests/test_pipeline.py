@@ -258,7 +258,7 @@ def test_where_all_scans_are_doubtful_there_is_a_preview_and_no_model(tmp_path: 
     assert "preview.ply (" in told.splitlines()[-1] and "model.ply" not in told
     wanted = Wanted(poses=[PoseFormat.OPEN3D], model=[MeshFormat.STL])
     (line,) = export(tmp_path, tmp_path / "out", wanted).left_out
-    assert line.startswith("left out of model.stl: ") and "preview.ply is of doubtful" in line
+    assert line.startswith("left out model.stl: ") and "preview.ply is of doubtful" in line
     asked = strict.model_copy(
         update={"fusion": FusionConfig(max_voxels_across=60, with_doubtful=True)}
     )

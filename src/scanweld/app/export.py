@@ -9,6 +9,7 @@ import numpy as np
 from scanweld.app.model_folder import ModelFolder, open_model
 from scanweld.app.options import Wanted
 from scanweld.app.outputs import PREVIEW
+from scanweld.app.refusals import Refusals
 from scanweld.app.workspace import Workspace
 from scanweld.errors import InputError, ReadError, ScanweldError
 from scanweld.geometry.arrays import FloatArray
@@ -42,26 +43,6 @@ class Exported:
     files: tuple[str, ...]
     notes: tuple[str, ...]
     left_out: tuple[str, ...]
-
-
-class _Refusals:
-    """What cannot be written, with the reasons."""
-
-    def __init__(self) -> None:
-        self.first: ScanweldError | None = None
-        self._without: dict[str, list[str]] = {}
-
-    def add(self, what: str, error: ScanweldError) -> None:
-        """Leave something out of a file or a format."""
-        self.first = self.first or error
-        self._without.setdefault(" ".join(str(error).split()), []).append(what)
-
-    def lines(self) -> tuple[str, ...]:
-        """One for each reason."""
-        return tuple(
-            f"left out of {', '.join(dict.fromkeys(what))}: {told}"
-            for told, what in self._without.items()
-        )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -101,7 +82,7 @@ def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -
     poses = _component(model, wanted)
     files, missing = _find_files(model, poses, wanted)
     parts = [folder / "poses.json", *files.values()]
-    refusals = _Refusals()
+    refusals = Refusals()
     with Workspace(output, inputs=parts, force=force) as workspace:
         source = _read(model, poses, files, missing)
         contents, notes = _render(source, wanted, workspace.output, refusals)
@@ -167,7 +148,7 @@ def _read(
 
 
 def _render(
-    source: _Source, wanted: Wanted, output: Path, refusals: _Refusals
+    source: _Source, wanted: Wanted, output: Path, refusals: Refusals
 ) -> tuple[dict[str, bytes], list[str]]:
     """All files by name, before any of them is written, and notes on them."""
     contents: dict[str, bytes] = {}
@@ -183,7 +164,7 @@ def _render(
         try:
             contents[f"model.{name}"] = _model(source.model, name, wanted)
         except ScanweldError as error:
-            refusals.add(f"model.{name}", error)
+            refusals.add_whole(f"model.{name}", [error])
     if "model.glb" in contents:
         notes += _glb_notes(source.model, wanted)
     if wanted.points:
@@ -214,18 +195,24 @@ def _poses(
     form: PoseFormat,
     shift: FloatArray | None,
     output: Path,
-    refusals: _Refusals,
+    refusals: Refusals,
 ) -> dict[str, str]:
     """Texts of a format of poses; scans that it cannot hold are left out."""
     kept: list[PosedScan] = []
+    errors: list[ScanweldError] = []
     for name in source.poses:
         try:
             scan = _posed(name, source, form, shift, output)
             form.write([scan])
             kept.append(scan)
         except ScanweldError as error:
-            refusals.add(form.title, error)
-    return form.write(kept) if kept else {}
+            errors.append(error)
+    if not kept:
+        refusals.add_whole(form.title, errors)
+        return {}
+    for error in errors:
+        refusals.add(form.title, error)
+    return form.write(kept)
 
 
 def _posed(
@@ -268,14 +255,15 @@ def _glb_notes(model: ModelFolder, wanted: Wanted) -> list[str]:
 
 
 def _points_file(
-    source: _Source, name: str, shift: FloatArray | None, refusals: _Refusals
+    source: _Source, name: str, shift: FloatArray | None, refusals: Refusals
 ) -> dict[str, bytes]:
     """A file of all scans' points in one frame, with the number of the scan that each is of."""
-    for error in source.broken.values():
-        refusals.add(name, error)
     scans = source.scans
     if not scans:
+        refusals.add_whole(name, list(source.broken.values()))
         return {}
+    for error in source.broken.values():
+        refusals.add(name, error)
     points = np.concatenate([source.poses[key].apply(scan.points) for key, scan in scans.items()])
     counts = [len(scan.points) for scan in scans.values()]
     labels = np.repeat(np.arange(len(counts)), counts)
