@@ -223,7 +223,9 @@ def test_a_scan_of_another_scale_is_doubtful_and_part_of_the_model_only_if_asked
     accused = {name for name, scan in without.scans.items() if "times too" in scan.reason}
     assert accused == {"scan_03"} <= set(without.poses)
     assert without.scans["scan_03"].verdict is ScanVerdict.DOUBTFUL
-    assert "times too large" in without.scans["scan_03"].reason
+    accused_of = without.scans["scan_03"].doubts
+    assert "times too large" in without.scans["scan_03"].reason == accused_of[0].text
+    assert accused_of[0].code == "scale" and not without.scans["scan_01"].doubts
     assert without.verdict is Verdict.DOUBTFUL
     assert without.reasons[0].startswith("doubtful: scan_03")
     assert without.reasons[0].endswith(" (placed, but left out of the model)")
@@ -240,6 +242,7 @@ def test_where_all_scans_are_doubtful_there_is_a_preview_and_no_model(tmp_path: 
     good, memory = few_run()
     result = pipeline.run(few(), strict, workers=1, cache=memory)
     assert {scan.verdict for scan in result.scans.values()} == {ScanVerdict.DOUBTFUL}
+    assert {d.code for scan in result.scans.values() for d in scan.doubts} == {"confidence"}
     assert result.mesh is None and result.verdict is Verdict.DOUBTFUL and good.preview is None
     assert result.preview is not None and good.mesh is not None
     np.testing.assert_array_equal(result.preview.vertices, good.mesh.vertices)

@@ -40,12 +40,26 @@ class ScanVerdict(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class DoubtReport:
+    """One thing that speaks against a placed scan's pose.
+
+    Attributes:
+        code: Its kind, for programs; see docs/report.md.
+        text: In words.
+    """
+
+    code: str
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class ScanReport:
     """What became of one scan.
 
     Attributes:
         verdict: Good, doubtful or unplaced; given if its pose was, and is not judged.
         reason: Why, in a sentence.
+        doubts: All that makes it doubtful; the first is the reason.
         num_points: Finite points read; 0 if the scan could not be read.
         num_dropped: NaN and infinite points left out.
         resolution: Median point spacing, in the scans' unit; None where not measured.
@@ -67,6 +81,7 @@ class ScanReport:
 
     verdict: ScanVerdict
     reason: str
+    doubts: tuple[DoubtReport, ...] = ()
     num_points: int = 0
     num_dropped: int = 0
     resolution: float | None = None

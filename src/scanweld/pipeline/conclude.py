@@ -20,6 +20,7 @@ from scanweld.pairs.result import Alternative, PairResult, weights_of
 from scanweld.pipeline.method import Scene
 from scanweld.reconstruction import (
     AlternativeReport,
+    DoubtReport,
     FactReport,
     FactVerdict,
     PairReport,
@@ -158,13 +159,16 @@ def _scan_report(
         overlap = _overlap(k, scene.judge, graph)
         told = f"{overlap:.0%} of its surface agrees with another scan"
         if k in graph.doubts:
-            verdict, reason = ScanVerdict.DOUBTFUL, graph.doubts[k]
+            verdict, reason = ScanVerdict.DOUBTFUL, graph.doubts[k][0].text
         else:
             verdict = ScanVerdict.GOOD
             pairs = "one pair" if len(neighbours) == 1 else f"{len(neighbours)} pairs"
             reason = f"held by {pairs}; {told}"
     return replace(
         prepared_report(scan, verdict, reason),
+        doubts=tuple(
+            DoubtReport(code=doubt.code.value, text=doubt.text) for doubt in graph.doubts.get(k, ())
+        ),
         num_keypoints=None if found is None else len(found.points),
         edges=tuple(sorted(prepared[n].name for n in neighbours)),
         overlap=overlap,

@@ -14,6 +14,7 @@ from scanweld.evidence.judge import Judge
 from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.graph.assemble import build_view_graph
+from scanweld.graph.doubts import DoubtCode, Doubts, doubt_of, merged
 from scanweld.graph.reasons import doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
 from scanweld.graph.view_graph import Component, ViewGraph
@@ -91,8 +92,8 @@ def refine_placed(
         graph = refine_graph(graph, method.refine, scene.judge)
         doubts = find_doubts(graph, scene.judge, config.graph)
         if axis is not None:
-            doubts = {**off_axis_doubts(graph, axis), **doubts}
-        graph = replace(graph, doubts={**_scale_doubts(scene.intake, graph), **doubts})
+            doubts = merged(doubts, off_axis_doubts(graph, axis))
+        graph = replace(graph, doubts=merged(doubts, _scale_doubts(scene.intake, graph)))
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     for k, reason in graph.unplaced.items():
@@ -100,14 +101,15 @@ def refine_placed(
     return graph
 
 
-def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:
+def _scale_doubts(intake: Intake, graph: ViewGraph) -> Doubts:
     """Scans that fit the others better when they are made larger or smaller."""
-    return {
+    told = {
         k: estimate.words()
         for component in graph.components
         for k, estimate in _scales(intake, graph, component).items()
         if estimate.is_off
     }
+    return doubt_of(DoubtCode.SCALE, told)
 
 
 def _scales(intake: Intake, graph: ViewGraph, component: Component) -> dict[int, ScaleEstimate]:
@@ -121,13 +123,14 @@ def assess_placed(
     with stages.stage("confidence") as counts:
         diagnostics = diagnostics_of(scene.intake.prepared, scene.judge, config.contours)
         confidence = assess(graph, diagnostics, stored_calibration(), config)
-        doubts = dict(graph.doubts)
-        for k, found in confidence.scans.items():
-            if found.confidence < config.confidence.min_good:
-                reason = f"its pose is right with a probability of {found.confidence:.0%} only"
-                doubts.setdefault(k, reason)
+        unsure = {
+            k: f"its pose is right with a probability of {found.confidence:.0%} only"
+            for k, found in confidence.scans.items()
+            if found.confidence < config.confidence.min_good
+        }
+        doubts = merged(graph.doubts, doubt_of(DoubtCode.CONFIDENCE, unsure))
         graph = replace(graph, doubts=doubts)
-        graph = replace(graph, doubts={**doubts, **doubt_alone(graph)})
+        graph = replace(graph, doubts=merged(doubts, doubt_alone(graph)))
         counts["doubtful"] = len(graph.doubts)
     return graph, confidence
 
