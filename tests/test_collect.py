@@ -1,5 +1,6 @@
 """From folders, patterns and files to scans with unique names."""
 
+import logging
 import os
 import sys
 from itertools import permutations
@@ -9,6 +10,8 @@ import pytest
 
 from scanweld.errors import InputError, ReadError
 from scanweld.io import collect, natural_key, read_scan
+from scanweld.io.not_scans import FOREIGN
+from scanweld.io.read import READERS
 
 
 @pytest.fixture
@@ -83,6 +86,61 @@ def test_what_is_missing_or_of_an_unknown_format_is_an_error(folder: Path):
     for what in ("folder.ply", "*.las", "none*.ply"):
         with pytest.raises(InputError, match="holds no scans"):
             collect([os.path.join(folder, what)])
+
+
+def test_a_folder_without_scans_says_what_it_holds_and_what_to_export(tmp_path: Path):
+    for name in ("a.fls", "b.FLS", "shot.bag", "notes.md", "points.txt", ".DS_Store"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "inner").mkdir()
+    with pytest.raises(InputError) as raised:
+        collect([tmp_path])
+    told = str(raised.value)
+    assert told.startswith(f"{tmp_path}: the folder holds no scans, but 2 .fls (FARO SCENE: export")
+    assert "shot.bag (a recording of ROS or RealSense: export depth images or PLY)" in told
+    assert "points.txt (name it if that is a scan)" in told and "inner/ (name it, too)" in told
+    assert "notes.md" in told and "DS_Store" not in told and "\n" not in told
+    for k in range(30):
+        (tmp_path / f"x.{k}").write_text("")
+    with pytest.raises(InputError, match=r"2 \.fls.* and \d+ kinds more; scanweld looks for"):
+        collect([tmp_path])
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="the folder holds no scans; scanweld looks for"):
+        collect([tmp_path / "empty"])
+
+
+def test_a_folder_with_scans_says_what_else_lies_there(
+    folder: Path, caplog: pytest.LogCaptureFixture
+):
+    with caplog.at_level(logging.INFO, "scanweld"):
+        collect([folder])
+    (record,) = caplog.records
+    assert record.levelname == "INFO" and "bun.conf" in record.message
+    caplog.clear()
+    (folder / "more.rcp").write_text("")
+    collect([folder])
+    (record,) = caplog.records
+    assert record.levelname == "WARNING"
+    assert "the folder also holds more.rcp (Autodesk ReCap: export E57 or PTS" in record.message
+
+
+@pytest.mark.parametrize("suffix", [suffix for kind in FOREIGN for suffix in kind.suffixes])
+def test_a_file_that_others_read_is_refused_with_what_to_export(tmp_path: Path, suffix: str):
+    (kind,) = [kind for kind in FOREIGN if suffix in kind.suffixes]  # told of once,
+    assert suffix not in READERS and suffix == suffix.lower()  # and never of what is read
+    path = tmp_path / f"scan{suffix.upper()}"
+    path.write_text("")
+    for read in (read_scan, lambda path: collect([path])):
+        with pytest.raises(ReadError) as raised:
+            read(path)
+        assert str(raised.value).startswith(f"{path}: is a format that scanweld does not read")
+        assert str(raised.value).endswith(kind.remedy)
+
+
+def test_what_to_export_is_documented():
+    text = (Path(__file__).parents[1] / "docs/formats.md").read_text(encoding="utf-8")
+    for kind in FOREIGN:
+        suffixes = " ".join(f"`{suffix}`" for suffix in kind.suffixes)
+        assert f"| {suffixes} | {kind.title} | {kind.remedy} |" in text
 
 
 def test_natural_order():

@@ -2,15 +2,18 @@
 
 import dataclasses
 import json
+import re
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import KDTree
 
 from scanweld.app import fuse as fuse_module
 from scanweld.app import job
+from scanweld.errors import ReadError
 from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.camera import CameraModel
@@ -52,6 +55,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def model(scene: Scene) -> Path:
     """A model in the folder ``model`` of scans in the folder ``scans``."""
+    return model_of(scene)
+
+
+def model_of(scene: Scene) -> Path:
     write_scans(Path("scans"), scene.scans)
     Path("coarse.toml").write_text(COARSE)
     folder = Path("model")
@@ -97,6 +104,91 @@ def test_everything_at_once(model: Path, scene: Scene, capsys: pytest.CaptureFix
         again = read_mesh(Path(f"out/model.{form}"))
         close = np.abs(again.vertices[again.faces] - scene.mesh.vertices[scene.mesh.faces])
         assert close.max() < 1e-4
+
+
+def far_away(scene: Scene, far: np.ndarray) -> Scene:
+    """The same scans, each in map coordinates of its own, in a world of such coordinates."""
+
+    def moved(pose: Pose) -> Pose:
+        return Pose(rotation=pose.rotation, translation=pose.translation + far)
+
+    to_near = Pose(rotation=np.eye(3), translation=-far)
+    return dataclasses.replace(
+        scene,
+        mesh=dataclasses.replace(scene.mesh, vertices=scene.mesh.vertices + far),
+        scans=tuple(
+            dataclasses.replace(
+                scan, points=scan.points + far, scan_from_sensor=moved(scan.sensor_pose)
+            )
+            for scan in scene.scans
+        ),
+        views=tuple(
+            dataclasses.replace(view, world_from_sensor=moved(view.world_from_sensor))
+            for view in scene.views
+        ),
+        world_from_scan={
+            name: moved(pose @ to_near) for name, pose in scene.world_from_scan.items()
+        },
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 20.0])
+def test_map_coordinates_are_kept_by_every_format(
+    scene: Scene, scale: float, capsys: pytest.CaptureFixture[str]
+):
+    """To a millionth of the diameter, and about a local origin where programs need that."""
+    size = float(np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0)))
+    far = scale * size * np.array([450_000.3, -5_400_000.7, 0.0])
+    scene = far_away(scene, far)
+    model = model_of(scene)
+    models = [word for form in ("ply", "obj", "stl", "glb") for word in ("--model", form)]
+    assert scanweld("export", model, *EVERY_POSE, *models, "--points", "all.ply", "-o", "out") == 0
+    (_, note) = capsys.readouterr().out.splitlines()
+    told, shift = note.split(" are about a local origin, for the world lies far off: add ")
+    assert set(told.removeprefix("note: ").split(", ")) == {
+        *("model.ply", "model.obj", "model.stl", "all.ply"),
+        *("poses.tum.txt", "colmap/images.txt", "transforms.json"),
+    }
+    shift = np.array([float(word) for word in shift.split()])
+    assert shift[2] == 0 and np.abs(far - shift).max() < 10 * size
+    triangles = scene.mesh.vertices[scene.mesh.faces]
+    for form in ("ply", "obj", "stl"):
+        again = read_mesh(Path(f"out/model.{form}"))
+        assert np.abs(again.vertices[again.faces] - triangles).max() < 1e-6 * size, form
+        other = trimesh.load(f"out/model.{form}", process=False, maintain_order=True)
+        assert isinstance(other, trimesh.Trimesh)
+        assert np.abs(other.triangles + shift - triangles).max() < 1e-6 * size, form
+    assert np.array_equal(read_mesh("out/model.ply").vertices, scene.mesh.vertices)
+    assert np.array_equal(read_mesh("out/model.obj").vertices, scene.mesh.vertices)
+    placed = trimesh.load("out/model.glb", process=False, force="mesh")  # moved with its node
+    assert isinstance(placed, trimesh.Trimesh)
+    assert np.abs(1000.0 * placed.triangles - triangles).max() < 1e-6 * size
+    posed = [scene.world_from_scan[s.name].apply(s.points) for s in scene.scans]
+    assert np.abs(read_scan("out/all.ply").points - np.concatenate(posed)).max() < 1e-6 * size
+    files = ("poses.conf", "poses.mlp", "poses.aln", "poses.tum.txt", "posegraph.json")
+    for name in (*files, "transforms.json", "colmap/images.txt", "colmap", "cloudcompare"):
+        found = read_any_poses(Path("out") / name)
+        poses = match_poses(Path(name), found, NAMES)
+        for scan, points in zip(scene.scans, posed, strict=True):
+            pose = poses[scan.name]
+            if found.frame is Frame.SENSOR:
+                pose = pose @ scan.sensor_pose.inverse()
+            assert np.abs(pose.apply(scan.points) - points).max() < 1e-6 * size, name
+
+
+@pytest.mark.parametrize("name", ["poses.tum.txt", "transforms.json", "model.obj"])
+def test_a_broken_shift_is_said(scene: Scene, name: str):
+    size = float(np.linalg.norm(np.ptp(scene.mesh.vertices, axis=0)))
+    model = model_of(far_away(scene, size * np.array([1e5, 0.0, 0.0])))
+    form = [*("--poses", "tum"), *("--poses", "nerfstudio"), *("--model", "obj")]
+    assert scanweld("export", model, *form, "-o", "out") == 0
+    text = (Path("out") / name).read_text(encoding="utf-8")
+    key = "shift" if name.endswith("json") else "scanweld_shift"
+    broken = text.replace(f'"{key}": [', '"shift": ["x",').replace(f"{key} ", f"{key} x")
+    assert broken != text
+    Path(name).write_text(broken, encoding="utf-8")
+    with pytest.raises(ReadError, match=f"its {key} is not three numbers"):
+        (read_mesh if name.endswith("obj") else read_any_poses)(Path(name))
 
 
 def check(path: Path, scene: Scene) -> None:
@@ -196,6 +288,25 @@ def test_scans_that_moved_are_found_where_said(model: Path, capsys: pytest.Captu
     assert scanweld("export", model, "--poses", "tum", "-o", "out") == 1
     assert "scan_01: its file is not where" in (line := error_line(capsys)) and "--scans" in line
     assert snapshot() == before
+    export = ("export", model, "--poses", "tum", "--poses", "conf", "--poses", "open3d")
+    assert scanweld(*export, "--model", "stl", "-o", "rest") == 3
+    told = capsys.readouterr().out.splitlines()
+    assert told[0] == "rest: posegraph.json, model.stl"
+    assert told[1].startswith("left out TUM, Stanford .conf: scan_01: its file is not where")
+    assert len(told) == 2 and told[1].endswith("(3 more scans likewise)")
+    shutil.copytree("moved", "scans")
+    Path("scans/scan_03.ply").unlink()
+    capsys.readouterr()
+    assert scanweld(*export, "--points", "all.ply", "-o", "most") == 3
+    (_, line) = capsys.readouterr().out.splitlines()
+    assert line.startswith("left out of TUM, Stanford .conf, all.ply: scan_03: its file is not")
+    kept = [name for name in NAMES if name != "scan_03"]
+    for name in ("poses.tum.txt", "poses.conf"):
+        found = read_any_poses(Path("most") / name)
+        assert set(match_poses(Path(name), found, kept)) == set(kept)
+    told = points_of(Path("most/all.ply"))[2]
+    assert told == tuple(f"scan {k} = {name}" for k, name in enumerate(kept))
+    assert "scan_03" in Path("most/posegraph.json").read_text(encoding="utf-8")
     assert scanweld("export", model, "--poses", "tum", "-o", "out", "--scans", "moved") == 0
     assert scanweld("export", model, "--poses", "open3d", "-o", "more") == 0  # needs no files
 
@@ -207,9 +318,15 @@ def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[
     write_scans(Path("scans"), scene_of(box(), views).scans)
     before = snapshot()
     for form in ("tum", "colmap", "nerfstudio"):
-        assert scanweld("export", model, "--poses", "mlp", "--poses", form, "-o", "out") == 1
+        assert scanweld("export", model, "--poses", form, "-o", "out") == 1
         assert "scan_01: its sensor is orthographic" in error_line(capsys)
     assert snapshot() == before
+    for form in ("tum", "colmap", "nerfstudio"):
+        assert scanweld("export", model, "--poses", "mlp", "--poses", form, "-o", form) == 3
+        told = capsys.readouterr().out.splitlines()
+        assert told[0] == f"{form}: poses.mlp" and len(told) == 2
+        assert re.match("left out .*: scan_01: its sensor is orthographic", told[1])
+        assert told[1].endswith("(3 more scans likewise)")
     Path("tum.txt").write_text("".join(f"{k} 0 0 0 0 0 0 1\n" for k in range(4)))
     assert scanweld("fuse", "scans", "--poses", "tum.txt", "-o", "fused", "-q") == 1
     assert "its sensor is orthographic, and TUM speaks of pinholes only" in error_line(capsys)
@@ -225,7 +342,7 @@ def test_a_sensor_that_is_no_pinhole(model: Path, capsys: pytest.CaptureFixture[
         ("", ["--points", "model.ply", "--model", "ply"], "is the model's name"),
         ("", ["--poses", "mlp", "--component", "2"], "has no component 2"),
         ("poses.json", ["--model", "glb"], "holds no poses.json"),
-        ("model.ply", ["--poses", "mlp", "--model", "glb"], "holds no model.ply"),
+        ("model.ply", ["--model", "obj", "--model", "glb"], "holds no model.ply"),
         ("report.json", ["--poses", "conf"], "scan_01: its file is not where"),
         ("config.toml=[pairs", ["--model", "glb"], "config.toml"),
         ("report.json={", ["--poses", "mlp"], "report.json: not valid JSON"),
@@ -252,6 +369,14 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     assert scanweld("export", model, *arguments, "-o", "out") == 1
     assert says in error_line(capsys)
     assert snapshot() == before
+
+
+def test_a_missing_model_leaves_the_rest(model: Path, capsys: pytest.CaptureFixture[str]):
+    (model / "model.ply").unlink()
+    assert scanweld("export", model, "--poses", "mlp", "--model", "glb", "-o", "out") == 3
+    told = capsys.readouterr().out.splitlines()
+    assert told[0] == "out: poses.mlp"
+    assert told[1].startswith("left out model.glb: ") and "holds no model.ply" in told[1]
 
 
 def test_no_output_is_replaced_unasked_and_no_input_ever(
@@ -366,6 +491,53 @@ def test_scans_without_a_pose_are_left_out_and_named(
     assert set(read_poses("fused/poses.json").poses) == set(NAMES[:3])
 
 
+BROKEN = {  # a file of poses -> what stands before a number without which one pose is none
+    "poses.json": r'"scan_02": \[\s*\[',
+    "poses.conf": r"scan_02.ply \S+ \S+ \S+ ",
+    "poses.mlp": r'scan_02.ply" visible="1">\s*<MLMatrix44>\s*',
+    "poses.aln": r"scan_02.ply\n#\n",
+    "poses.tum.txt": r"\n1 \S+ \S+ \S+ ",
+    "colmap/images.txt": r"\n2 ",
+    "posegraph.json": r'"pose": \[\s*',
+    "cloudcompare/scan_02.txt": "",
+    "transforms.json": r'scan_02.png"[^[]*\[\s*\[\s*',
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_one_broken_matrix_leaves_out_its_scan_alone(
+    model: Path, scene: Scene, name: str, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(fuse_module, "fuse", lambda *_, **__: scene.mesh)
+    monkeypatch.setattr(fuse_module, "write_html_report", lambda *_: None)
+    assert scanweld("export", model, *EVERY_POSE, "-o", "out") == 0
+    shutil.copy(model / "poses.json", "out/poses.json")
+    path = Path("out") / name
+    text = path.read_text(encoding="utf-8")
+    path.write_text(
+        re.sub(f"({BROKEN[name]})[-.0-9e]+", r"\g<1>9", text, count=1), encoding="utf-8"
+    )
+    given = path.parent if "cloudcompare" in name else path
+    assert scanweld(*FUSE, "--poses", given, "-o", "fused", "-q") == 3
+    found = read_poses("fused/poses.json")
+    (left_out,) = found.unplaced
+    assert set(found.poses) == set(NAMES) - {left_out}
+    assert left_out == ("scan_01" if name == "posegraph.json" else "scan_02")
+    assert path.name in found.unplaced[left_out]
+
+
+def test_a_sensor_of_which_the_poses_cannot_speak_leaves_out_its_scan(
+    model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
+):
+    assert scanweld("export", model, "--poses", "colmap", "-o", "out") == 0
+    turned = view_of(box(), 20, 25, pixels=70, model=CameraModel.ORTHOGRAPHIC)
+    write_scans(Path("scans"), scene_of(box(), [turned]).scans)
+    capsys.readouterr()
+    assert scanweld(*FUSE, "--poses", "out/colmap", "-o", "fused", "-q") == 3
+    assert "unplaced scan_01: scan_01: its sensor is orthographic" in capsys.readouterr().out
+    assert set(read_poses("fused/poses.json").poses) == set(NAMES[1:])
+
+
 @pytest.mark.parametrize(
     ("poses", "says"),
     [
@@ -393,7 +565,7 @@ def test_bad_poses_are_one_line_and_nothing_is_written(
 
 
 @pytest.mark.parametrize("arguments", [["--poses", "mlp"], ["--points", "all.ply"]])
-def test_scans_that_have_changed_since_are_refused(
+def test_scans_that_have_changed_since_are_left_out(
     model: Path, arguments: list[str], capsys: pytest.CaptureFixture[str]
 ):
     report = json.loads((model / "report.json").read_text(encoding="utf-8"))
@@ -402,8 +574,12 @@ def test_scans_that_have_changed_since_are_refused(
     (model / "report.json").write_text(json.dumps(report), encoding="utf-8")
     assert scanweld("export", model, *arguments, "-o", "same") == 0
     capsys.readouterr()
-    first, second = [Path("scans") / f"{name}.ply" for name in list(report["scans"])[:2]]
+    first, second, third, fourth = (Path("scans") / f"{name}.ply" for name in report["scans"])
     first.write_bytes(second.read_bytes())
+    assert scanweld("export", model, *arguments, "-o", "most") == 3
+    assert f"{first.stem}: is not the scan that model was made of" in capsys.readouterr().out
+    for path in (second, third, fourth):
+        shutil.copy(first if path is fourth else fourth, path)
     assert scanweld("export", model, *arguments, "-o", "changed") == 1
     assert f"{first.stem}: is not the scan that model was made of" in error_line(capsys)
     assert not Path("changed").exists()

@@ -157,6 +157,21 @@ def test_summary_says_verdict_reasons_and_files(result: Reconstruction):
     assert text.startswith("nothing: no two of the 2 scans") and "model.ply" not in text
 
 
+def test_a_model_far_off_says_about_what_it_is_written(tmp_path: Path, result: Reconstruction):
+    assert result.mesh is not None and "shift" not in report_json(result)
+    far = result.mesh.vertices + np.array([450_000.0, 0.0, 0.0])
+    away = dataclasses.replace(result, mesh=dataclasses.replace(result.mesh, vertices=far))
+    write_outputs(away, tmp_path)
+    assert np.array_equal(read_mesh(tmp_path / "model.ply").vertices, far)
+    x, y, z = load(tmp_path / "report.json")["shift"]
+    assert f"comment scanweld_shift {x:.0f} {y:.0f} {z:.0f}" in (
+        (tmp_path / "model.ply").read_bytes().split(b"end_header")[0].decode()
+    )
+    assert f"model.ply is about a local origin, for the world lies far off: add {x:.0f} " in (
+        summary(away, Path("model"))
+    )
+
+
 def test_no_confidence_at_all_is_the_least(tmp_path: Path):
     result = a_result(["a", "b"])
     scans = {

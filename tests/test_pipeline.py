@@ -1,16 +1,23 @@
 """End to end on small rendered scenes: scans to poses, model and verdict."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from scanweld.config import Config, FusionConfig, HeatConfig, PrepareConfig
+from scanweld.app.export import export
+from scanweld.app.html_report import write_html_report
+from scanweld.app.options import MeshFormat, PoseFormat, Wanted
+from scanweld.app.outputs import write_outputs
+from scanweld.app.summary import summary
+from scanweld.config import ConfidenceConfig, Config, FusionConfig, HeatConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.metrics import (
     Standing,
@@ -216,7 +223,9 @@ def test_a_scan_of_another_scale_is_doubtful_and_part_of_the_model_only_if_asked
     accused = {name for name, scan in without.scans.items() if "times too" in scan.reason}
     assert accused == {"scan_03"} <= set(without.poses)
     assert without.scans["scan_03"].verdict is ScanVerdict.DOUBTFUL
-    assert "times too large" in without.scans["scan_03"].reason
+    accused_of = without.scans["scan_03"].doubts
+    assert "times too large" in without.scans["scan_03"].reason == accused_of[0].text
+    assert accused_of[0].code == "scale" and not without.scans["scan_01"].doubts
     assert without.verdict is Verdict.DOUBTFUL
     assert without.reasons[0].startswith("doubtful: scan_03")
     assert without.reasons[0].endswith(" (placed, but left out of the model)")
@@ -225,6 +234,39 @@ def test_a_scan_of_another_scale_is_doubtful_and_part_of_the_model_only_if_asked
     assert len(with_it.mesh.faces) > 1.02 * len(without.mesh.faces)
     for name, pose in without.poses.items():
         np.testing.assert_array_equal(pose.matrix(), with_it.poses[name].matrix())
+
+
+@pytest.mark.slow
+def test_where_all_scans_are_doubtful_there_is_a_preview_and_no_model(tmp_path: Path):
+    strict = CONFIG.model_copy(update={"confidence": ConfidenceConfig(min_good=1.0)})
+    good, memory = few_run()
+    result = pipeline.run(few(), strict, workers=1, cache=memory)
+    assert {scan.verdict for scan in result.scans.values()} == {ScanVerdict.DOUBTFUL}
+    assert {d.code for scan in result.scans.values() for d in scan.doubts} == {"confidence"}
+    assert result.mesh is None and result.verdict is Verdict.DOUBTFUL and good.preview is None
+    assert result.preview is not None and good.mesh is not None
+    np.testing.assert_array_equal(result.preview.vertices, good.mesh.vertices)
+    assert result.reasons[1:] == (
+        "no model: all scans that it would be made of are doubtful",
+        "preview.ply shows how the doubtful scans lie; it is no model",
+    )
+    write_outputs(result, tmp_path)
+    assert not (tmp_path / "model.ply").exists()
+    head = (tmp_path / "preview.ply").read_bytes().split(b"end_header")[0].decode()
+    assert "comment preview of doubtful scans, not a model" in head
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["preview"]
+    assert "preview.ply shows how the doubtful" in write_html_report(tmp_path).read_text("utf-8")
+    told = summary(result, tmp_path)
+    assert "no model: all of its scans are doubtful; preview.ply shows" in told
+    assert "preview.ply (" in told.splitlines()[-1] and "model.ply" not in told
+    wanted = Wanted(poses=[PoseFormat.OPEN3D], model=[MeshFormat.STL])
+    (line,) = export(tmp_path, tmp_path / "out", wanted).left_out
+    assert line.startswith("left out model.stl: ") and "preview.ply is of doubtful" in line
+    asked = strict.model_copy(
+        update={"fusion": FusionConfig(max_voxels_across=60, with_doubtful=True)}
+    )
+    result = pipeline.run(few(), asked, workers=1, cache=memory)
+    assert result.mesh is not None and result.preview is None
 
 
 def test_a_model_that_cannot_be_fused_is_not_passed_over(monkeypatch: pytest.MonkeyPatch):

@@ -14,6 +14,7 @@ from scanweld.evidence.judge import Poses
 from scanweld.evidence.patches import PixelConsensus, pixel_consensus, violates_free_space
 from scanweld.evidence.pixels import FREE_MARGIN_PIXELS, see
 from scanweld.geometry.pose import Pose, rotation_exp
+from scanweld.graph.doubts import DoubtCode, Doubts, doubt_of
 from scanweld.graph.merge import Merge, propose_merges, unrefuted
 from scanweld.graph.reasons import doubt_alone, find_doubts
 from scanweld.graph.view_graph import Component
@@ -177,13 +178,13 @@ def test_what_only_a_feature_holds_is_doubtful():
     marked = replace(pairs[2, 3], kind=PairKind.AMBIGUOUS, rests_on_feature=True)
     component = Component(poses=dict(enumerate(world)), reference=0)
 
-    def doubts(last: PairResult) -> dict[int, str]:
+    def doubts(last: PairResult) -> Doubts:
         both = {**pairs, (2, 3): last}
         graph = graph_with(both, component, accepted=both)
         return find_doubts(graph, DrawnJudge(says=lambda i, j, pose: seen(0.5)), GraphConfig())
 
     assert doubts(pairs[2, 3]) == {}
-    assert list(doubts(marked)) == [3] and "mark" in doubts(marked)[3]
+    assert list(doubts(marked)) == [3] and "mark" in doubts(marked)[3][0].text
 
 
 @pytest.mark.parametrize(
@@ -195,7 +196,8 @@ def test_no_scan_is_good_alone(doubtful: set[int], more: list[int]):
         Component(poses={k: world[k] for k in scans}, reference=scans[0])
         for scans in ((0, 1, 2), (3, 4))
     )
-    graph = replace(graph_with({}, three, two), doubts=dict.fromkeys(sorted(doubtful), "far"))
+    far = doubt_of(DoubtCode.SCALE, dict.fromkeys(sorted(doubtful), "far"))
+    graph = replace(graph_with({}, three, two), doubts=far)
     assert list(doubt_alone(graph)) == more
 
 

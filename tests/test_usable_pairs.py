@@ -138,7 +138,9 @@ def test_final_poses_off_the_axis_are_doubtful():
     for poses, doubtful in ((slid, {3}), (world, set())):
         component = Component(poses=dict(enumerate(poses)), reference=0)
         doubts = off_axis_doubts(graph_with(pairs, component), found)
-        assert set(doubts) == doubtful and all("deg off the axis" in d for d in doubts.values())
+        assert set(doubts) == doubtful and all(
+            "deg off the axis" in doubt.text for (doubt,) in doubts.values()
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

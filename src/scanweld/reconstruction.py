@@ -43,12 +43,26 @@ class ScanVerdict(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class DoubtReport:
+    """One thing that speaks against a placed scan's pose.
+
+    Attributes:
+        code: Its kind, for programs; see docs/report.md.
+        text: In words.
+    """
+
+    code: str
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class ScanReport:
     """What became of one scan.
 
     Attributes:
         verdict: Good, doubtful or unplaced; given if its pose was, and is not judged.
         reason: Why, in a sentence.
+        doubts: All that makes it doubtful; the first is the reason.
         num_points: Finite points read; 0 if the scan could not be read.
         num_dropped: NaN and infinite points left out.
         resolution: Median point spacing, in the scans' unit; None where not measured.
@@ -73,6 +87,7 @@ class ScanReport:
 
     verdict: ScanVerdict
     reason: str
+    doubts: tuple[DoubtReport, ...] = ()
     num_points: int = 0
     num_dropped: int = 0
     resolution: float | None = None
@@ -188,6 +203,7 @@ class Reconstruction:
         pairs: Report of every pair, ordered by names.
         mesh: Fused surface of the largest component, in its frame; None if nothing was placed, or
             what was placed could not be fused.
+        preview: The same of doubtful scans, where all of that component are: to look at, no model.
         verdict: The whole in one word.
         reasons: Why it is not good, in sentences.
         stages: Time and memory per stage, in the order of the run.
@@ -208,5 +224,6 @@ class Reconstruction:
     stages: Mapping[str, StageReport]
     config: Config
     knowledge: tuple[FactReport, ...] = ()
+    preview: TriangleMesh | None = None
     prepared: Mapping[str, PreparedScan] = field(default_factory=dict)
     sensor: SensorModel | None = None

@@ -1,27 +1,71 @@
 """A model in the formats of other tools: its poses, its surface and its points."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from scanweld.app.model_folder import ModelFolder, open_model
 from scanweld.app.options import Wanted
+from scanweld.app.outputs import PREVIEW
+from scanweld.app.refusals import Refusals
 from scanweld.app.workspace import Workspace
-from scanweld.errors import InputError
+from scanweld.errors import InputError, ReadError, ScanweldError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import UNCOLORED, TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import natural_key, path_from, write_whole
+from scanweld.io.local_origin import about_note, find_shift
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
-from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
+from scanweld.io.pose_formats import FORMATS, Frame, PosedScan, PoseFormat
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.sensor import locate_sensor
 
+_ABOUT_SHIFT = ("model.ply", "model.obj", "model.stl")
+"""Files of the model in which one far off is about a local origin; a GLB moves it back itself."""
 
-def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -> list[str]:
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Exported:
+    """What an export has written.
+
+    Attributes:
+        files: Names of the files, as seen from the output's folder.
+        notes: What is to be known about them, a line each.
+        left_out: What could not be written and why, a line each.
+    """
+
+    files: tuple[str, ...]
+    notes: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class _Source:
+    """What is exported: posed scans, as far as their files are there.
+
+    Attributes:
+        model: The folder.
+        poses: Of the component's scans, in natural order.
+        files: Where their files are, as far as they are needed,
+        scans: and what they hold.
+        broken: Why others cannot be read, by name.
+    """
+
+    model: ModelFolder
+    poses: Mapping[str, Pose]
+    files: Mapping[str, Path]
+    scans: Mapping[str, RangeScan]
+    broken: Mapping[str, ScanweldError]
+
+
+def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -> Exported:
     """Write a model in other formats into a folder that appears when it is whole.
+
+    A scan or a format that cannot be written is left out and named; the rest is written.
 
     Args:
         folder: A model, as ``scanweld run`` or ``fuse`` has made it.
@@ -29,25 +73,29 @@ def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -
         wanted: What to write.
         force: Whether an output that is there already is replaced.
 
-    Returns:
-        What was written and what is to be known about it, a line each.
-
     Raises:
-        ScanweldError: If a part of the model that is asked for is missing or broken, or a format
-            cannot hold it; nothing is written then.
+        ScanweldError: If nothing that is asked for can be written; then there is no output.
     """
     model = open_model(folder)
     poses = _component(model, wanted)
-    files = _find_files(model, poses, wanted)
+    files, missing = _find_files(model, poses, wanted)
     parts = [folder / "poses.json", *files.values()]
+    refusals = Refusals()
     with Workspace(output, inputs=parts, force=force) as workspace:
-        contents, notes = _render(model, poses, files, wanted, workspace.output)
+        source = _read(model, poses, files, missing)
+        contents, notes = _render(source, wanted, workspace.output, refusals)
+        if not contents and refusals.first is not None:
+            raise refusals.first
         for name, data in contents.items():
             path = workspace.staging / name
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, data)
         workspace.publish()
-    return [f"{output}: {', '.join(contents)}", *_left_out(model, wanted.component), *notes]
+    return Exported(
+        files=tuple(contents),
+        notes=(*_not_of_it(model, wanted.component), *notes),
+        left_out=refusals.lines(),
+    )
 
 
 def _component(model: ModelFolder, wanted: Wanted) -> dict[str, Pose]:
@@ -70,61 +118,124 @@ def _component(model: ModelFolder, wanted: Wanted) -> dict[str, Pose]:
     return {name: model.poses.poses[name] for name in names}
 
 
-def _find_files(model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted) -> dict[str, Path]:
-    """The scans' files, as far as they are needed."""
+def _find_files(
+    model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted
+) -> tuple[dict[str, Path], dict[str, InputError]]:
+    """The scans' files, as far as they are needed, and why some are not there."""
     formats = [FORMATS[name] for name in wanted.poses]
     if wanted.points or any(f.needs_files or f.frame is Frame.SENSOR for f in formats):
-        return model.scan_files(names, wanted.scans)
-    return {}
+        return model.find_files(names, wanted.scans)
+    return {}, {}
 
 
-def _render(
+def _read(
     model: ModelFolder,
     poses: Mapping[str, Pose],
     files: Mapping[str, Path],
-    wanted: Wanted,
-    output: Path,
+    missing: Mapping[str, ScanweldError],
+) -> _Source:
+    """Read the scans. Formats that only name the files are right for these very ones, too."""
+    scans: dict[str, RangeScan] = {}
+    broken = dict(missing)
+    for name, path in files.items():
+        try:
+            scans |= model.read_whole_scans({name: path})
+        except (InputError, ReadError) as error:
+            broken[name] = error
+    return _Source(model=model, poses=poses, files=files, scans=scans, broken=broken)
+
+
+def _render(
+    source: _Source, wanted: Wanted, output: Path, refusals: Refusals
 ) -> tuple[dict[str, bytes], list[str]]:
     """All files by name, before any of them is written, and notes on them."""
     contents: dict[str, bytes] = {}
     notes: list[str] = []
-    # Formats that only name the files are right for these very scans, too: all are checked.
-    scans = model.read_whole_scans(files)
+    shift = _shift(source, wanted)
+    about: list[str] = []
     for name in dict.fromkeys(wanted.poses):
-        sensors = scans if FORMATS[name].frame is Frame.SENSOR else {}
-        posed = [_posed(key, pose, files, sensors, output) for key, pose in poses.items()]
-        contents |= {key: text.encode() for key, text in FORMATS[name].write(posed).items()}
+        texts = _poses(source, FORMATS[name], shift, output, refusals)
+        contents |= {key: text.encode() for key, text in texts.items()}
+        if FORMATS[name].frame is Frame.SENSOR:
+            about += list(texts)[:1]
     for name in dict.fromkeys(wanted.model):
-        contents[f"model.{name}"] = _model(model, name, wanted)
-    if "glb" in wanted.model:
-        notes += _glb_notes(model, wanted)
+        try:
+            contents[f"model.{name}"] = _model(source.model, name, wanted)
+        except ScanweldError as error:
+            refusals.add_whole(f"model.{name}", [error])
+    if "model.glb" in contents:
+        notes += _glb_notes(source.model, wanted)
     if wanted.points:
-        contents[wanted.points], told = _points(scans, poses)
-        notes += told
+        contents |= _points_file(source, wanted.points, shift, refusals)
+        notes += _grey_notes(source.scans.values())
+    about += [key for key in contents if key in _ABOUT_SHIFT or key == wanted.points]
+    if shift is not None and about:
+        notes.append(about_note(about, shift))
     return contents, notes
 
 
-def _posed(
-    name: str,
-    pose: Pose,
-    files: Mapping[str, Path],
-    sensors: Mapping[str, RangeScan],
+def _shift(source: _Source, wanted: Wanted) -> FloatArray | None:
+    """The local origin of what lies far off: that of the mesh, if there is one."""
+    if wanted.component == 1:
+        try:
+            if source.model.mesh is not None:
+                return find_shift(source.model.mesh.vertices)
+        except ReadError:  # who exports it says so
+            pass
+    scans = source.scans
+    if not scans:
+        return None
+    return find_shift(np.concatenate([source.poses[k].apply(s.points) for k, s in scans.items()]))
+
+
+def _poses(
+    source: _Source,
+    form: PoseFormat,
+    shift: FloatArray | None,
     output: Path,
+    refusals: Refusals,
+) -> dict[str, str]:
+    """Texts of a format of poses; scans that it cannot hold are left out."""
+    kept: list[PosedScan] = []
+    errors: list[ScanweldError] = []
+    for name in source.poses:
+        try:
+            scan = _posed(name, source, form, shift, output)
+            form.write([scan])
+            kept.append(scan)
+        except ScanweldError as error:
+            errors.append(error)
+    if not kept:
+        refusals.add_whole(form.title, errors)
+        return {}
+    for error in errors:
+        refusals.add(form.title, error)
+    return form.write(kept)
+
+
+def _posed(
+    name: str, source: _Source, form: PoseFormat, shift: FloatArray | None, output: Path
 ) -> PosedScan:
-    located = locate_sensor(sensors[name]) if name in sensors else None
+    speaks_of_sensors = form.frame is Frame.SENSOR
+    if name in source.broken and (form.needs_files or speaks_of_sensors):
+        raise source.broken[name]
+    located = locate_sensor(source.scans[name]) if speaks_of_sensors else None
     return PosedScan(
         name=name,
-        world_from_scan=pose,
-        file=path_from(output, files[name]) if name in files else None,
+        world_from_scan=source.poses[name],
+        file=path_from(output, source.files[name]) if name in source.files else None,
         camera=None if located is None else located.camera,
         scan_from_sensor=None if located is None else located.scan_from_sensor,
+        shift=shift,
     )
 
 
 def _model(model: ModelFolder, name: str, wanted: Wanted) -> bytes:
     mesh = model.mesh
     if mesh is None:
-        raise InputError(f"{model.path}: holds no model.ply, so there is no model to export")
+        doubtful = (model.path / PREVIEW).is_file()
+        told = f"; {PREVIEW} is of doubtful scans, which are no model" if doubtful else ""
+        raise InputError(f"{model.path}: holds no model.ply, so there is no model to export{told}")
     if name == "ply":
         return model.mesh_path.read_bytes()
     writers: dict[str, Callable[[TriangleMesh], bytes]] = {
@@ -141,24 +252,36 @@ def _glb_notes(model: ModelFolder, wanted: Wanted) -> list[str]:
     return ["note: the scans' unit is unknown, so model.glb takes it for metres; say it by --unit"]
 
 
-def _points(scans: Mapping[str, RangeScan], poses: Mapping[str, Pose]) -> tuple[bytes, list[str]]:
-    """All scans' points in one frame, with the number of the scan that each is of."""
-    points = np.concatenate([poses[name].apply(scan.points) for name, scan in scans.items()])
+def _points_file(
+    source: _Source, name: str, shift: FloatArray | None, refusals: Refusals
+) -> dict[str, bytes]:
+    """A file of all scans' points in one frame, with the number of the scan that each is of."""
+    scans = source.scans
+    if not scans:
+        refusals.add_whole(name, list(source.broken.values()))
+        return {}
+    for error in source.broken.values():
+        refusals.add(name, error)
+    points = np.concatenate([source.poses[key].apply(scan.points) for key, scan in scans.items()])
     counts = [len(scan.points) for scan in scans.values()]
     labels = np.repeat(np.arange(len(counts)), counts)
-    grey = [name for name, scan in scans.items() if scan.colors is None]
     colors = None
-    if len(grey) < len(scans):
+    if any(scan.colors is not None for scan in scans.values()):
         plain = [np.full((n, 3), UNCOLORED, np.uint8) for n in counts]
         each = zip(scans.values(), plain, strict=True)
         colors = np.concatenate([p if scan.colors is None else scan.colors for scan, p in each])
-    data = points_ply_bytes(points, labels, [printed(name) for name in scans], colors)
-    if colors is None or not grey:
-        return data, []
-    return data, [f"note: without colours of their own, so grey among the points: {_list(grey)}"]
+    names = [printed(key) for key in scans]
+    return {name: points_ply_bytes(points, labels, names, colors, shift)}
 
 
-def _left_out(model: ModelFolder, component: int) -> list[str]:
+def _grey_notes(scans: Collection[RangeScan]) -> list[str]:
+    grey = [scan.name for scan in scans if scan.colors is None]
+    if len(grey) in (0, len(scans)):
+        return []
+    return [f"note: without colours of their own, so grey among the points: {_list(grey)}"]
+
+
+def _not_of_it(model: ModelFolder, component: int) -> list[str]:
     notes = []
     count = len(model.poses.components)
     if count > 1:

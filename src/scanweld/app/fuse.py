@@ -9,15 +9,16 @@ from scanweld.app.job import NO_LIMITS, Limits, read_all, relative_paths
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
+from scanweld.errors import InputError
 from scanweld.fusion import fuse
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.io import collect, natural_key
-from scanweld.io.pose_formats import Frame, PoseEntries, match_poses, read_any_poses
+from scanweld.io import collect, natural_key, printable
+from scanweld.io.pose_formats import Frame, PoseEntries, match_all_poses, read_any_poses
 from scanweld.io.pose_formats.records import require_pinhole
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline.conclude import prepared_report, unplaced_report
-from scanweld.pipeline.intake import Intake, take_in
+from scanweld.pipeline.intake import Intake, require_two, take_in
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 from scanweld.work.progress import NoCache, Progress, ScanRefused, silent, telling
 from scanweld.work.stage_log import Stages
@@ -46,7 +47,8 @@ def fuse_job(
         progress: Told of stages, their finished items, and scans that are refused.
 
     Returns:
-        The model and the poses in the world frame that was given; these are not judged.
+        The model and the poses in the world frame that was given; these are not judged. A scan
+        without a sound pose, or of which the file's poses cannot speak, is left out and named.
 
     Raises:
         ScanweldError: If the poses cannot be read or are of other scans, there are fewer than two
@@ -55,14 +57,16 @@ def fuse_job(
     config = config or Config()
     files = collect(inputs)
     found = read_any_poses(poses)
-    known = match_poses(poses, found, [file.name for file in files])
+    known, broken = match_all_poses(poses, found, [file.name for file in files])
     parts = [*(poses.iterdir() if poses.is_dir() else [poses]), *(file.path for file in files)]
     with Workspace(output, inputs=parts, force=force) as workspace:
         scans, unreadable = read_all([file for file in files if file.name in known], progress)
         cache = FileCache(cache_folder(output)) if limits.keeps else NoCache()
         stages = Stages(workers=num_workers(limits.workers), cache=cache, progress=progress)
         without = {
-            file.name: f"no pose in {poses.name}" for file in files if file.name not in known
+            file.name: printable(str(broken.get(file.name, f"no pose in {poses.name}")))
+            for file in files
+            if file.name not in known
         }
         for name, reason in without.items():
             progress(ScanRefused(scan=name, reason=reason))
@@ -85,10 +89,20 @@ def _fuse(
     stages: Stages,
 ) -> Reconstruction:
     """Fuse the scans that can be, and report the others, some of which are without a pose."""
-    world_from_sensor = [_sensor_pose(scan, known[scan.name], found) for scan in intake.prepared]
+    left_out = {**intake.refused, **without}
+    prepared: list[PreparedScan] = []
+    world_from_sensor: list[Pose] = []
+    for scan in intake.prepared:
+        try:
+            world_from_sensor.append(_sensor_pose(scan, known[scan.name], found))
+            prepared.append(scan)
+        except InputError as error:
+            left_out[scan.name] = str(error)
+            stages.progress(ScanRefused(scan=scan.name, reason=str(error)))
+    require_two(prepared, left_out)
     with stages.stage("fuse") as counts:
         mesh = fuse(
-            intake.prepared,
+            prepared,
             world_from_sensor,
             config.fusion,
             prepare=config.prepare,
@@ -96,18 +110,17 @@ def _fuse(
             cache=stages.cache,
         )
         counts["faces"] = len(mesh.faces)
-    pairs = zip(intake.prepared, world_from_sensor, strict=True)
+    pairs = zip(prepared, world_from_sensor, strict=True)
     poses = {scan.name: pose @ scan.scan_from_sensor.inverse() for scan, pose in pairs}
     if found.frame is Frame.SCAN:
         poses = {name: known[name] for name in poses}  # as given, to the last bit
-    left_out = {**intake.refused, **without}
     told = "fused with the pose that was given, which is not judged"
     return Reconstruction(
         poses=poses,
         components=(tuple(sorted(poses, key=natural_key)),),
         unplaced=left_out,
         scans={
-            **{s.name: prepared_report(s, ScanVerdict.GIVEN, told) for s in intake.prepared},
+            **{s.name: prepared_report(s, ScanVerdict.GIVEN, told) for s in prepared},
             **{n: unplaced_report(intake.scans.get(n), why) for n, why in left_out.items()},
         },
         pairs=(),
@@ -116,7 +129,7 @@ def _fuse(
         reasons=_reasons(left_out),
         stages=stages.reports,
         config=config,
-        prepared={scan.name: scan for scan in intake.prepared},
+        prepared={scan.name: scan for scan in prepared},
     )
 
 

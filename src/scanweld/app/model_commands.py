@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scanweld.app.options import (
+    NOT_GOOD,
     ConfigFile,
     Force,
     Inputs,
@@ -218,8 +219,10 @@ class ExportOptions:
 
 @takes(ExportOptions)
 def export(options: ExportOptions) -> None:
-    """Write a model, its poses and points in the formats of other tools."""
+    """Write a model, its poses and points for other tools; exit code 3 if some was left out."""
     from scanweld.app.export import export as export_model
 
-    lines = export_model(options.model_dir, options.output, options.wanted, force=options.force)
-    typer.echo("\n".join(lines))
+    made = export_model(options.model_dir, options.output, options.wanted, force=options.force)
+    lines = [f"{options.output}: {', '.join(made.files)}", *made.notes]
+    typer.echo("\n".join([*lines, *made.left_out]))
+    raise typer.Exit(NOT_GOOD if made.left_out else 0)

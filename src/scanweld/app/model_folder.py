@@ -95,16 +95,28 @@ class ModelFolder:
             InputError: If one of them is not there.
             ReadError: If the report is broken.
         """
-        found = {file.name: file.path for file in collect(given)} if given else self._told_files()
-        names = list(names)
+        found, missing = self.find_files(names, given)
+        for error in missing.values():
+            raise error
+        return found
+
+    def find_files(
+        self, names: Iterable[str], given: Sequence[Path | str] = ()
+    ) -> tuple[dict[str, Path], dict[str, InputError]]:
+        """The same, and of each scan whose file is not there, why that is so."""
+        known = {file.name: file.path for file in collect(given)} if given else self._told_files()
+        found: dict[str, Path] = {}
+        missing: dict[str, InputError] = {}
         for name in names:
-            if name not in found or not found[name].is_file():
-                place = f" ({found[name]})" if name in found else ""
-                where = "among the scans given" if given else f"where the model says{place}"
-                raise InputError(
-                    f"{printed(name)}: its file is not {where}; name all scans with --scans"
-                )
-        return {name: found[name] for name in names}
+            if name in known and known[name].is_file():
+                found[name] = known[name]
+                continue
+            place = f" ({known[name]})" if name in known else ""
+            where = "among the scans given" if given else f"where the model says{place}"
+            missing[name] = InputError(
+                f"{printed(name)}: its file is not {where}; name all scans with --scans"
+            )
+        return found, missing
 
     def read_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
         """Scans as the model's maker took them: thinned where it had to save memory.

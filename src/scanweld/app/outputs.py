@@ -1,4 +1,4 @@
-"""What a run writes: poses.json, graph.json, report.json, config.toml and model.ply."""
+"""What a run writes: poses.json, graph.json, report.json, config.toml, model.ply or preview.ply."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -8,11 +8,14 @@ from typing import Any
 from scanweld.app.json_text import json_text
 from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet, natural_key, write_mesh_ply, write_poses, write_whole
+from scanweld.io.local_origin import find_shift
 from scanweld.reconstruction import PairReport, Reconstruction
 from scanweld.sensor.model import SensorModel
 from scanweld.work.stage_log import StageReport
 
 FORMAT = 1
+PREVIEW = "preview.ply"
+PREVIEW_COMMENT = "preview of doubtful scans, not a model: their poses may be wrong"
 
 Json = Mapping[str, Any]
 
@@ -27,7 +30,8 @@ def write_outputs(
 
     Args:
         result: What the run found out.
-        folder: An existing folder. There is no model.ply where there is no mesh.
+        folder: An existing folder. There is no model.ply where there is no mesh, but preview.ply
+            where all scans are doubtful.
         files: Where each scan's file is, as seen from the folder's final place.
         max_points: To how many points scans were thinned at most, if they were.
 
@@ -44,6 +48,8 @@ def write_outputs(
     write_whole(folder / "config.toml", result.config.to_toml().encode())
     if result.mesh is not None:
         write_mesh_ply(folder / "model.ply", result.mesh)
+    if result.preview is not None:
+        write_mesh_ply(folder / PREVIEW, result.preview, [PREVIEW_COMMENT])
 
 
 def graph_json(result: Reconstruction) -> Json:
@@ -60,6 +66,8 @@ def report_json(
     files = files or {}
     names = sorted(result.scans, key=natural_key)
     facts = [asdict(fact) for fact in result.knowledge]
+    mesh = result.mesh or result.preview
+    shift = None if mesh is None else find_shift(mesh.vertices)
     return {
         "format": FORMAT,
         "verdict": result.verdict.value,
@@ -68,6 +76,8 @@ def report_json(
         **({"knowledge": facts} if facts else {}),
         **({} if max_points is None else {"max_points": max_points}),
         **({} if result.sensor is None else {"sensor": _sensor(result.sensor)}),
+        **({} if shift is None else {"shift": shift.tolist()}),
+        **({} if result.preview is None else {"preview": PREVIEW}),
         "scans": {name: asdict(result.scans[name]) | {"file": files.get(name)} for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+from scanweld.app.outputs import PREVIEW
 from scanweld.io import natural_key
+from scanweld.io.local_origin import about_note, find_shift
 from scanweld.reconstruction import Reconstruction, ScanVerdict, Verdict
 
 
@@ -21,8 +23,14 @@ def summary(result: Reconstruction, output: Path) -> str:
         lines += [f"  component {k + 1}: {', '.join(c)}" for k, c in enumerate(result.components)]
     lines += [f"  {fact.verdict} {fact.fact}: {fact.reason}" for fact in result.knowledge]
     lines += _least_sure(result)
-    if result.poses and result.mesh is None:
+    if result.preview is not None:
+        lines.append(f"  no model: all of its scans are doubtful; {PREVIEW} shows where they lie")
+    elif result.poses and result.mesh is None:
         lines.append("  no model: the placed scans could not be fused")
+    mesh = result.mesh or result.preview
+    shift = None if mesh is None else find_shift(mesh.vertices)
+    if shift is not None:
+        lines.append(f"  {about_note([PREVIEW if result.mesh is None else 'model.ply'], shift)}")
     lines.append(f"  {output}: {', '.join(_files(result))}")
     return "\n".join(lines)
 
@@ -61,4 +69,6 @@ def _in_order(reasons: dict[str, str]) -> list[tuple[str, str]]:
 def _files(result: Reconstruction) -> list[str]:
     mesh = result.mesh
     model = [] if mesh is None else [f"model.ply ({len(mesh.vertices):,} vertices)"]
+    if result.preview is not None:
+        model.append(f"{PREVIEW} ({len(result.preview.vertices):,} vertices)")
     return [*model, "report.html", "poses.json", "graph.json", "report.json", "config.toml"]

@@ -11,6 +11,7 @@ from scanweld.evidence.judge import PairJudge
 from scanweld.evidence.slippage import Slide, slide_words
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.graph.doubts import Doubt, DoubtCode, doubt_of, merged
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.symmetry import fold_words
@@ -95,38 +96,52 @@ def _rest_on_feature_alone(graph: ViewGraph, component: Component) -> set[int]:
     return set(component.poses) - (most if len(most) > 1 else set())
 
 
-def find_doubts(graph: ViewGraph, judge: PairJudge, config: GraphConfig) -> dict[int, str]:
+def find_doubts(
+    graph: ViewGraph, judge: PairJudge, config: GraphConfig
+) -> dict[int, tuple[Doubt, ...]]:
     """What speaks against the final poses of placed scans, by scan; known doubts stay."""
-    doubts = dict(graph.doubts)
+    marked: dict[int, str] = {}
+    moved: dict[int, str] = {}
+    violated: dict[int, str] = {}
+    unpaired: dict[int, str] = {}
+    disagree: dict[int, str] = {}
     for component in graph.components:
         for k in _rest_on_feature_alone(graph, component):
-            doubts[k] = "only a small mark decides its pose: others hide the mark"
+            marked[k] = "only a small mark decides its pose: others hide the mark"
         for k, share in _unexplained(graph, component, judge).items():
-            doubts[k] = (
+            moved[k] = (
                 f"a part of {share:.0%} of its surface lies where another sensor saw through: a "
                 "part of the object moved, or a pose is wrong"
             )
         shares = _violated_shares(graph, component, judge)
         for k, share in shares.items():
             if share > config.max_violated_share:
-                doubts[k] = (
+                violated[k] = (
                     f"other sensors saw through its surface, or it hides theirs: {share:.0%} of "
                     "what agrees"
                 )
-            elif not graph.neighbours(k):
-                doubts[k] = "no single pair confirms its pose"
+            if not graph.neighbours(k):
+                unpaired[k] = "no single pair confirms its pose"
     for edge in _good_but_rejected(graph):
         against = graph.pairs[edge].alternatives[0].score
         for k in edge:
             if _strength(k, graph) < OUTWEIGHED * against:
-                doubts.setdefault(k, "a good pair disagrees with its pose")
-    return doubts
+                disagree[k] = "a good pair disagrees with its pose"
+    return merged(
+        graph.doubts,
+        doubt_of(DoubtCode.MARK_ONLY, marked),
+        doubt_of(DoubtCode.MOVED_PART, moved),
+        doubt_of(DoubtCode.VIOLATED, violated),
+        doubt_of(DoubtCode.UNPAIRED, unpaired),
+        doubt_of(DoubtCode.DISAGREEMENT, disagree),
+    )
 
 
-def doubt_alone(graph: ViewGraph) -> dict[int, str]:
+def doubt_alone(graph: ViewGraph) -> dict[int, tuple[Doubt, ...]]:
     """Scans whose component has no other one without doubts: a pose is right beside others only."""
     sure = [sorted(set(component.poses) - set(graph.doubts)) for component in graph.components]
-    return {scans[0]: "no other scan of its component is good" for scans in sure if len(scans) == 1}
+    told = "no other scan of its component is good"
+    return doubt_of(DoubtCode.ALONE, {scans[0]: told for scans in sure if len(scans) == 1})
 
 
 def best_first(graph: ViewGraph) -> ViewGraph:

@@ -8,6 +8,7 @@ import numpy as np
 
 from scanweld.evidence.judge import PairJudge
 from scanweld.geometry.pose import Pose
+from scanweld.graph.doubts import DoubtCode, doubt_of
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 
 logger = logging.getLogger(__name__)
@@ -34,20 +35,21 @@ def refine_graph(graph: ViewGraph, refine: Refine, judge: PairJudge) -> ViewGrap
     """
     components: list[Component] = []
     rms: dict[int, float] = {}
-    doubts: dict[int, str] = {}
+    apart: dict[int, str] = {}
     for component in graph.components:
         edges = [edge for edge in graph.accepted if edge[0] in component.poses]
         refined, rms_of = refine(component.poses, edges, graph.compared(component))
         loss = _mean_score(component.poses, edges, judge) - _mean_score(refined, edges, judge)
         if loss > MAX_SCORE_LOSS:
             logger.warning("the joint refinement made the evidence worse and is left out")
-            doubts.update(dict.fromkeys(component.poses, "surfaces and evidence pull it apart"))
+            apart.update(dict.fromkeys(component.poses, "surfaces and evidence pull it apart"))
             components.append(component)
             continue
         to_reference = refined[component.reference].inverse()
         poses = {k: to_reference @ pose for k, pose in refined.items()}
         components.append(replace(component, poses=poses))
         rms.update(rms_of)
+    doubts = doubt_of(DoubtCode.NOT_REFINED, apart)
     return replace(graph, components=tuple(components), rms=rms, doubts=doubts)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from scanweld.geometry.pose import Pose
+from scanweld.graph.doubts import Doubts
 from scanweld.pairs.result import Alternative, PairResult
 
 Edge = tuple[int, int]
@@ -42,7 +43,7 @@ class ViewGraph:
         rejected: Why the other pairs are not used.
         components: Of at least two scans, largest first.
         unplaced: Why the other scans are in none.
-        doubts: What speaks against a placed scan's final pose, in words.
+        doubts: What speaks against a placed scan's final pose.
         rms: Point-to-plane residual of each placed scan after the joint refinement.
         remarks: Of accepted pairs that are believed for what is given beforehand.
     """
@@ -53,7 +54,7 @@ class ViewGraph:
     rejected: Mapping[Edge, str]
     components: tuple[Component, ...]
     unplaced: Mapping[int, str]
-    doubts: Mapping[int, str] = field(default_factory=dict)
+    doubts: Doubts = field(default_factory=dict)
     rms: Mapping[int, float] = field(default_factory=dict)
     remarks: Mapping[Edge, str] = field(default_factory=dict)
 

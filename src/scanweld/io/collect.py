@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 
 from scanweld.errors import InputError, ReadError
 from scanweld.io.names import natural_key, printable
+from scanweld.io.not_scans import foreign_kind, inventory, why_unread
 from scanweld.io.read import READERS
 
 logger = logging.getLogger(__name__)
@@ -64,23 +65,29 @@ def _expand(each: Path | str) -> list[Path]:
     if not path.exists():
         raise ReadError(f"{path}: there is no such file; check the path")
     if path.suffix.lower() not in READERS:
-        raise ReadError(f"{path}: unknown format; scanweld reads {', '.join(READERS)}")
+        raise ReadError(why_unread(path, READERS))
     return [path]
 
 
 def _scans_among(candidates: list[Path], where: str, left_out: frozenset[str]) -> list[Path]:
     known = READERS.keys() - left_out
     scans: list[Path] = []
+    others: list[Path] = []
     for path in candidates:
         is_scan = path.suffix.lower() in known and not path.name.startswith(".")
         is_dangling = path.is_symlink() and not path.exists()
         if is_scan and (path.is_file() or is_dangling):  # the reader says what is wrong with it
             scans.append(path)
         else:
-            logger.debug("%s: no scan, left out", path)
+            others.append(path)
+    found = inventory(others, left_out)
     if not scans:
         formats = ", ".join(suffix for suffix in READERS if suffix in known)
-        raise InputError(f"{where} holds no scans; scanweld looks for {formats} there")
+        told = f", but {found}" if found else ""
+        raise InputError(f"{where} holds no scans{told}; scanweld looks for {formats} there")
+    if found:
+        is_meant = any(foreign_kind(path) is not None for path in others)
+        logger.log(logging.WARNING if is_meant else logging.INFO, "%s also holds %s", where, found)
     return scans
 
 

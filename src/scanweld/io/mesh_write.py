@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scanweld.errors import WriteError
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.io.local_origin import find_shift, shift_text
 
 _TURNS = {
     "x": [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
@@ -25,12 +26,15 @@ _VERTICES, _INDICES = 34962, 34963
 def obj_bytes(mesh: TriangleMesh) -> bytes:
     """An OBJ with the mesh's normals, and colours (0 to 1) behind the coordinates.
 
-    Colours there are no part of the format, but what most programs write and read.
+    Colours there are no part of the format, but what most programs write and read. A mesh far off
+    is written about a local origin, which a comment tells.
     """
-    vertices = mesh.vertices
+    vertices, head = mesh.vertices, []
+    if (shift := find_shift(vertices)) is not None:
+        vertices, head = vertices - shift, [f"# {shift_text(shift)}"]
     if mesh.colors is not None:
         vertices = np.hstack([vertices, np.round(mesh.colors / 255.0, 6)])
-    lines = ["v " + " ".join(map(repr, row)) for row in (vertices + 0.0).tolist()]
+    lines = head + ["v " + " ".join(map(repr, row)) for row in (vertices + 0.0).tolist()]
     corner = "{0}"
     if mesh.normals is not None:
         normals = np.round(mesh.normals, 7) + 0.0
@@ -43,6 +47,8 @@ def obj_bytes(mesh: TriangleMesh) -> bytes:
 def stl_bytes(mesh: TriangleMesh) -> bytes:
     """A binary STL: single precision, neither shared vertices nor colours.
 
+    A mesh far off is written about a local origin, which the header tells.
+
     Raises:
         WriteError: If the mesh has no faces, which is all that an STL holds.
     """
@@ -51,13 +57,18 @@ def stl_bytes(mesh: TriangleMesh) -> bytes:
     normals = face_normals(mesh.vertices, mesh.faces)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     facets["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    facets["corners"] = mesh.vertices[mesh.faces]
-    head = b"binary STL, coordinates in the unit of the scans".ljust(80)
+    shift = find_shift(mesh.vertices)
+    corners = mesh.vertices[mesh.faces]
+    facets["corners"] = corners if shift is None else corners - shift
+    about = "coordinates in the unit of the scans" if shift is None else shift_text(shift)
+    head = f"binary STL, {about}".encode("ascii").ljust(80)
     return head + struct.pack("<I", len(facets)) + facets.tobytes()
 
 
 def glb_bytes(mesh: TriangleMesh, unit: str | None = None, up: str = "y") -> bytes:
     """A binary glTF 2.0: Y up, in metres, colours linear, as its specification asks.
+
+    A mesh far off is written about a local origin, to where its node is moved.
 
     Args:
         mesh: With at least one face.
@@ -71,15 +82,20 @@ def glb_bytes(mesh: TriangleMesh, unit: str | None = None, up: str = "y") -> byt
     _require_faces(mesh, "GLB")
     turn = _gltf_from_mesh(up)
     scale = 1.0 if unit is None else _METRES[unit]
+    shift = find_shift(mesh.vertices)
+    local = mesh.vertices if shift is None else mesh.vertices - shift
     buffer = _Buffer()
-    attributes = {"POSITION": buffer.add(scale * mesh.vertices @ turn.T, with_bounds=True)}
+    attributes = {"POSITION": buffer.add(scale * local @ turn.T, with_bounds=True)}
     if mesh.normals is not None:
         attributes["NORMAL"] = buffer.add(_unit(mesh.normals) @ turn.T)
     if mesh.colors is not None:
         attributes["COLOR_0"] = buffer.add(_linear(mesh.colors))
     faces = buffer.add_indices(mesh.faces)
     primitive = {"attributes": attributes, "indices": faces, "material": 0, "mode": 4}
-    return buffer.glb(primitive)
+    node: dict[str, object] = {"mesh": 0, "name": "model"}
+    if shift is not None:
+        node["translation"] = (scale * turn @ shift + 0.0).tolist()
+    return buffer.glb(primitive, node)
 
 
 def _require_faces(mesh: TriangleMesh, title: str) -> None:
@@ -149,7 +165,7 @@ class _Buffer:
         self._accessors.append({"bufferView": len(self._views) - 1, **accessor, **bounds})
         return len(self._accessors) - 1
 
-    def glb(self, primitive: dict[str, object]) -> bytes:
+    def glb(self, primitive: dict[str, object], node: dict[str, object]) -> bytes:
         """The file: a header, the description as JSON, the buffer."""
         body = b"".join(self._bodies)
         matte = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
@@ -157,7 +173,7 @@ class _Buffer:
             "asset": {"version": "2.0", "generator": "scanweld"},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0, "name": "model"}],
+            "nodes": [node],
             "meshes": [{"primitives": [primitive]}],
             "materials": [{"pbrMetallicRoughness": matte, "doubleSided": True}],
             "accessors": self._accessors,

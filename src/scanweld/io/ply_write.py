@@ -12,6 +12,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io.atomic import write_whole
+from scanweld.io.local_origin import find_shift, shift_text
 from scanweld.io.ply import CAMERA_KEY, POSE_KEY
 
 _TYPE_NAMES = {"<f4": "float", "<f8": "double", "|u1": "uchar", "<i4": "int"}
@@ -45,16 +46,23 @@ def write_scan_ply(path: Path | str, scan: RangeScan) -> None:
     write_whole(Path(path), _file(info, elements))
 
 
-def write_mesh_ply(path: Path | str, mesh: TriangleMesh) -> None:
+def write_mesh_ply(path: Path | str, mesh: TriangleMesh, comments: Sequence[str] = ()) -> None:
     """Write a mesh with its normals, rounded to single precision, its colours, and what is known.
 
-    The properties ``support``, ``stdev`` and ``filled`` are as in the mesh.
+    The properties ``support``, ``stdev`` and ``filled`` are as in the mesh. A mesh far off is
+    written about a local origin, which a comment tells.
+
+    Args:
+        path: Of the file.
+        mesh: The mesh.
+        comments: Further lines of the header.
 
     Raises:
         WriteError: If the file cannot be written.
     """
     normals = None if mesh.normals is None else mesh.normals.astype(np.float32)
-    vertex = _vertex_fields(mesh.vertices, normals, mesh.colors)
+    vertices, told = _about_local_origin(mesh.vertices, find_shift(mesh.vertices))
+    vertex = _vertex_fields(vertices, normals, mesh.colors)
     if mesh.support is not None:
         vertex["support"] = mesh.support.astype("<i4")
     if mesh.stdev is not None:
@@ -62,11 +70,15 @@ def write_mesh_ply(path: Path | str, mesh: TriangleMesh) -> None:
     if mesh.filled is not None:
         vertex["filled"] = mesh.filled.astype("|u1")
     elements = [_scalar_element("vertex", vertex), _face_element(mesh.faces)]
-    write_whole(Path(path), _file([], elements))
+    write_whole(Path(path), _file([], elements, [*told, *comments]))
 
 
 def points_ply_bytes(
-    points: FloatArray, labels: IntArray, names: Sequence[str], colors: ByteArray | None
+    points: FloatArray,
+    labels: IntArray,
+    names: Sequence[str],
+    colors: ByteArray | None,
+    shift: FloatArray | None = None,
 ) -> bytes:
     """A PLY of points that know their scan: property ``scan`` of each vertex.
 
@@ -75,11 +87,20 @@ def points_ply_bytes(
         labels: (N,) which of the names each is of; comments ``scan K = NAME`` tell them.
         names: Of the scans, on one line each.
         colors: (N, 3) or None.
+        shift: The local origin (3,) about which they are written, which a comment tells; or None.
     """
+    points, told = _about_local_origin(points, shift)
     vertex = _vertex_fields(points, None, colors)
     vertex["scan"] = labels.astype("<i4")
-    comments = [f"comment scan {k} = {name}" for k, name in enumerate(names)]
+    comments = [*told, *(f"scan {k} = {name}" for k, name in enumerate(names))]
     return _file([], [_scalar_element("vertex", vertex)], comments)
+
+
+def _about_local_origin(
+    points: FloatArray, shift: FloatArray | None
+) -> tuple[FloatArray, list[str]]:
+    """Points (N, 3) less the shift, and the comment that tells it."""
+    return (points, []) if shift is None else (points - shift, [shift_text(shift)])
 
 
 def _camera_text(camera: Camera) -> str:
@@ -139,7 +160,8 @@ def _index_element(name: str, lists: IntArray, counts: ByteArray) -> tuple[list[
 def _file(
     info: list[str], elements: list[tuple[list[str], bytes]], comments: Sequence[str] = ()
 ) -> bytes:
-    lines = ["ply", "format binary_little_endian 1.0", *comments]
+    lines = ["ply", "format binary_little_endian 1.0"]
+    lines += [f"comment {line}" for line in comments]
     lines += [f"obj_info {line}" for line in info]
     for header, _ in elements:
         lines += header

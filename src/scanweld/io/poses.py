@@ -46,17 +46,28 @@ def read_poses(path: Path | str) -> PoseSet:
     Raises:
         ReadError: If the file is not such JSON, or a matrix is not a rigid motion.
     """
-    path = Path(path)
+    pose_set, broken = read_sound_poses(Path(path))
+    for error in broken.values():
+        raise error
+    return pose_set
+
+
+def read_sound_poses(path: Path) -> tuple[PoseSet, dict[str, ReadError]]:
+    """The poses that are rigid motions, and of the other scans what is wrong with theirs.
+
+    Raises:
+        ReadError: If the file is not such JSON.
+    """
     content = load_json(path, read_text(path))
     try:
         if "format" not in content:
-            poses = {name: _pose(name, rows) for name, rows in content.items()}
-            return PoseSet(poses=poses, components=(tuple(poses),) if poses else ())
+            poses, broken = _poses(path, content)
+            return PoseSet(poses=poses, components=(tuple(poses),) if poses else ()), broken
         if content["format"] != FORMAT:
             raise ValueError(f"format {content['format']!r} is unknown, only {FORMAT} can be read")
-        return _own_format(content)
+        return _own_format(path, content)
     except ValueError as error:
-        raise ReadError(f"{path}: {error}; correct the file or write it anew") from error
+        raise _refusal(path, error) from error
 
 
 def write_poses(path: Path | str, pose_set: PoseSet) -> None:
@@ -140,19 +151,37 @@ def _refuse_constant(word: str) -> NoReturn:
     raise ValueError(f"{word} is no number in JSON")
 
 
-def _own_format(content: dict[str, Any]) -> PoseSet:
+def _refusal(path: Path, error: ValueError) -> ReadError:
+    return ReadError(f"{path}: {error}; correct the file or write it anew")
+
+
+def _poses(path: Path, scans: dict[str, Any]) -> tuple[dict[str, Pose], dict[str, ReadError]]:
+    """Poses by name, and what is wrong with those that are none."""
+    poses: dict[str, Pose] = {}
+    broken: dict[str, ReadError] = {}
+    for name, rows in scans.items():
+        try:
+            poses[name] = _pose(name, rows)
+        except ValueError as error:
+            broken[name] = _refusal(path, error)
+    return poses, broken
+
+
+def _own_format(path: Path, content: dict[str, Any]) -> tuple[PoseSet, dict[str, ReadError]]:
     scans, unplaced = content.get("scans"), content.get("unplaced", {})
     if not isinstance(scans, dict) or not isinstance(unplaced, dict):
         raise ValueError("'scans' and 'unplaced' must be JSON objects")
-    poses = {name: _pose(name, rows) for name, rows in scans.items()}
+    poses, broken = _poses(path, scans)
     components = content.get("components", [list(poses)] if poses else [])
     if not isinstance(components, list) or not all(_is_names(part) for part in components):
         raise ValueError("'components' must be a list of lists of names")
-    return PoseSet(
+    sound = [tuple(name for name in part if name not in broken) for part in components]
+    pose_set = PoseSet(
         poses=poses,
-        components=tuple(tuple(part) for part in components),
+        components=tuple(part for k, part in enumerate(sound) if part or not components[k]),
         unplaced={name: str(reason) for name, reason in unplaced.items()},
     )
+    return pose_set, broken
 
 
 def _is_names(part: Any) -> bool:

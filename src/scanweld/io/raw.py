@@ -13,6 +13,7 @@ from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io.coarseness import refuse_coarse
 
 logger = logging.getLogger(__name__)
 
@@ -54,12 +55,15 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
     confidences that are not finite become zero: nothing is known there.
 
     Raises:
-        ReadError: If an index names no point, or no finite point is left.
+        ReadError: If an index names no point, no finite point is left, or coordinates come in too
+            large steps.
     """
     finite = _checked(path, raw)
     dropped = int((~finite).sum())
     if dropped == len(finite):
         raise ReadError(f"{path}: holds no points, or none that is finite; leave it out")
+    points = raw.points[finite] if dropped else raw.points
+    refuse_coarse(path, points, are_vertices=raw.faces is not None and len(raw.faces) > 0)
     grid, faces = raw.grid, raw.faces if raw.faces is not None and len(raw.faces) else None
     if dropped:
         new_index = np.where(finite, np.cumsum(finite) - 1, -1)
@@ -76,7 +80,7 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
         logger.info("%s: %d points that are not finite dropped", path, dropped)
     return RangeScan(
         name=name,
-        points=raw.points[finite] if dropped else raw.points,
+        points=points,
         grid=grid,
         faces=faces,
         normals=None if raw.normals is None else _zero_unless_finite(raw.normals[finite]),

@@ -1,12 +1,15 @@
 """One door for all formats: ``read_scan`` and ``read_mesh``."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from scanweld.errors import ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
+from scanweld.io.local_origin import SHIFT_KEY, told_shift
 from scanweld.io.mesh_formats import read_obj, read_off, read_stl
+from scanweld.io.not_scans import why_unread
 from scanweld.io.ply import read_ply
 from scanweld.io.raw import RawScan, to_mesh, to_scan
 from scanweld.io.xyz import read_xyz
@@ -47,11 +50,31 @@ def read_mesh(path: Path | str) -> TriangleMesh:
 def _read(path: Path) -> RawScan:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ReadError(f"{path}: unknown format; scanweld reads {', '.join(READERS)}")
+        raise ReadError(why_unread(path, READERS))
     try:
         data = path.read_bytes()
     except OSError as error:
         raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     if not data:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
-    return reader(path, data)
+    return in_world(path, data, reader(path, data))
+
+
+def in_world(path: Path, data: bytes, raw: RawScan) -> RawScan:
+    """What scanweld wrote about a local origin, moved back to where it belongs.
+
+    Args:
+        path: Of the file, for messages.
+        data: Its bytes.
+        raw: What they hold.
+
+    Raises:
+        ReadError: If the file's shift is no three numbers.
+    """
+    try:
+        shift = told_shift(data)
+    except ValueError as error:
+        raise ReadError(
+            f"{path}: its {SHIFT_KEY} is not three numbers ({error}); correct or remove it"
+        ) from error
+    return raw if shift is None else replace(raw, points=raw.points + shift)

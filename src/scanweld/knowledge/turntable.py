@@ -9,6 +9,7 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.axis import Axis, fit_axis
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.graph.doubts import DoubtCode, Doubts, doubt_of
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 
@@ -101,12 +102,12 @@ def find_turntable(
     return best
 
 
-def off_axis_doubts(graph: ViewGraph, turntable: Turntable) -> dict[int, str]:
+def off_axis_doubts(graph: ViewGraph, turntable: Turntable) -> Doubts:
     """Placed scans whose final pose is no turn about the axis from others: thin pairs slide."""
     same = np.array([turntable.same.angle_deg, turntable.same.shift])
     residual = np.array([turntable.angle_deg, turntable.shift])
     limits = np.maximum(FINAL_SHARE * same, FINAL_RESIDUALS * residual)
-    doubts = {}
+    told: dict[int, str] = {}
     for component in graph.components:
         poses = component.poses
         for k in sorted(poses):
@@ -115,8 +116,8 @@ def off_axis_doubts(graph: ViewGraph, turntable: Turntable) -> dict[int, str]:
             angle, shift = np.median(off, axis=0)
             if angle > limits[0] or shift > limits[1]:
                 times = max(angle / limits[0], shift / limits[1])
-                doubts[k] = f"its pose is {angle:.1f} deg off the axis, {times:.1f} times the limit"
-    return doubts
+                told[k] = f"its pose is {angle:.1f} deg off the axis, {times:.1f} times the limit"
+    return doubt_of(DoubtCode.OFF_AXIS, told)
 
 
 def turning_pairs(pairs: Mapping[Edge, PairResult]) -> dict[Edge, PairResult]:

@@ -21,6 +21,7 @@ from scanweld.pairs.result import Alternative, PairResult, weights_of
 from scanweld.pipeline.method import Scene
 from scanweld.reconstruction import (
     AlternativeReport,
+    DoubtReport,
     FactReport,
     FactVerdict,
     PairReport,
@@ -167,13 +168,16 @@ def _scan_report(
         overlap = _overlap(k, scene.judge, graph)
         told = f"{overlap:.0%} of its surface agrees with another scan"
         if k in graph.doubts:
-            verdict, reason = ScanVerdict.DOUBTFUL, graph.doubts[k]
+            verdict, reason = ScanVerdict.DOUBTFUL, graph.doubts[k][0].text
         else:
             verdict = ScanVerdict.GOOD
             pairs = "one pair" if len(neighbours) == 1 else f"{len(neighbours)} pairs"
             reason = f"held by {pairs}; {told}"
     return replace(
         prepared_report(scan, verdict, reason),
+        doubts=tuple(
+            DoubtReport(code=doubt.code.value, text=doubt.text) for doubt in graph.doubts.get(k, ())
+        ),
         num_keypoints=None if found is None else len(found.points),
         edges=tuple(sorted(prepared[n].name for n in neighbours)),
         overlap=overlap,
@@ -269,6 +273,7 @@ def _verdict(
     if not graph.components:
         told = ("no two scans could be registered to each other", *why_open(graph), *denied)
         return Verdict.NOTHING, told
+    largest = graph.components[0]
     by_verdict = {
         kind: [name for name, scan in sorted(scans.items()) if scan.verdict is kind]
         for kind in ScanVerdict
@@ -282,7 +287,9 @@ def _verdict(
     if len(graph.components) > 1:
         sizes = ", ".join(str(len(component.poses)) for component in graph.components)
         reasons.append(f"the scans fall into {len(graph.components)} components of {sizes} scans")
-    if mesh is None:
+    if not config.fusion.with_doubtful and largest.poses.keys() <= graph.doubts.keys():
+        reasons.append("no model: all scans that it would be made of are doubtful")
+    elif mesh is None:
         reasons.append("the placed scans could not be fused into a model")
     reasons += why_open(graph)
     reasons += denied

@@ -103,12 +103,7 @@ def take_in(
         prepared = list(taken.values())
         counts["scans"] = len(prepared)
         counts["refused"] = len(refused)
-    if len(prepared) < 2:
-        told = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
-        raise InputError(
-            f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}; give at least 2"
-            + (f" ({told})" if told else "")
-        )
+    require_two(prepared, refused)
     prepared.sort(key=lambda scan: (scan.content_hash, scan.name))
     return Intake(
         prepared=tuple(prepared),
@@ -118,6 +113,24 @@ def take_in(
         knowledge=knowledge,
         known=knowledge.by_index(prepared),
     )
+
+
+def require_two(prepared: Sequence[PreparedScan], refused: Mapping[str, str]) -> None:
+    """Make sure that there is something to put together.
+
+    Args:
+        prepared: The scans that take part.
+        refused: Reason for each of the others, by name.
+
+    Raises:
+        InputError: If there are fewer than two.
+    """
+    if len(prepared) < 2:
+        told = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
+        raise InputError(
+            f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}; give at least 2"
+            + (f" ({told})" if told else "")
+        )
 
 
 def _without_duplicates(

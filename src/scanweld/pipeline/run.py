@@ -1,6 +1,7 @@
 """Scans -> reconstruction: the one entry to both methods."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from scanweld.config import Config
 from scanweld.geometry.scan import RangeScan
@@ -18,6 +19,7 @@ from scanweld.pipeline.stages import (
     fuse_largest,
     lay_out,
     place_scans,
+    preview_largest,
     refine_placed,
 )
 from scanweld.reconstruction import Reconstruction
@@ -26,6 +28,7 @@ from scanweld.work.runners import Runner
 from scanweld.work.stage_log import Stages
 from scanweld.work.threads import num_workers, single_threaded_algebra
 
+PREVIEWED = "preview.ply shows how the doubtful scans lie; it is no model"
 METHODS = {"robust": robust_method, "paper": published_method}
 """By their names in the settings: from the scans of a run to the steps of a method."""
 
@@ -90,5 +93,9 @@ def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructio
     graph = refine_placed(scene, graph, axis, method, config, stages)
     graph, confidence = assess_placed(scene, graph, config, stages)
     mesh = fuse_largest(intake, graph, config, stages)
+    preview = preview_largest(intake, graph, config, stages)
     facts = check_knowledge(scene, graph, axis)
-    return conclude(scene, graph, confidence, mesh, facts, config, stages.reports)
+    result = conclude(scene, graph, confidence, mesh, facts, config, stages.reports)
+    if preview is None:
+        return result
+    return replace(result, preview=preview, reasons=(*result.reasons, PREVIEWED))

@@ -1,7 +1,7 @@
 """The stages of a run, one after the other."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from scanweld.confidence.assess import Confidence, assess
@@ -15,6 +15,7 @@ from scanweld.fusion.fuse import fuse
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.assemble import build_view_graph
+from scanweld.graph.doubts import DoubtCode, Doubts, doubt_of, merged
 from scanweld.graph.reasons import best_first, doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
 from scanweld.graph.view_graph import Component, ViewGraph
@@ -98,10 +99,10 @@ def refine_placed(
     with stages.stage("refine") as counts:
         graph = refine_graph(graph, method.refine, scene.judge)
         doubts = find_doubts(graph, scene.judge, config.graph)
-        doubts = {**doubts, **_standing_doubts(scene, graph)}
+        doubts = merged(_standing_doubts(scene, graph), doubts)
         if axis is not None:
-            doubts = {**off_axis_doubts(graph, axis), **doubts}
-        graph = replace(graph, doubts={**_scale_doubts(scene.intake, graph), **doubts})
+            doubts = merged(doubts, off_axis_doubts(graph, axis))
+        graph = replace(graph, doubts=merged(doubts, _scale_doubts(scene.intake, graph)))
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     for k, reason in graph.unplaced.items():
@@ -109,26 +110,27 @@ def refine_placed(
     return graph
 
 
-def _standing_doubts(scene: Scene, graph: ViewGraph) -> dict[int, str]:
+def _standing_doubts(scene: Scene, graph: ViewGraph) -> Doubts:
     """Scans that a camera that stood still took of something that moved."""
-    doubts: dict[int, str] = {}
+    told: dict[int, str] = {}
     for component in graph.components:
         found = standing_scans(
             scene.judge.fields, component.poses, graph.compared(component), scene.judge.diameter
         )
         if found is not None:
-            doubts.update(dict.fromkeys(found.scans, found.words()))
-    return doubts
+            told.update(dict.fromkeys(found.scans, found.words()))
+    return doubt_of(DoubtCode.CAMERA_STOOD, told)
 
 
-def _scale_doubts(intake: Intake, graph: ViewGraph) -> dict[int, str]:
+def _scale_doubts(intake: Intake, graph: ViewGraph) -> Doubts:
     """Scans that fit the others better when they are made larger or smaller."""
-    return {
+    told = {
         k: estimate.words()
         for component in graph.components
         for k, estimate in _scales(intake, graph, component).items()
         if estimate.is_off
     }
+    return doubt_of(DoubtCode.SCALE, told)
 
 
 def _scales(intake: Intake, graph: ViewGraph, component: Component) -> dict[int, ScaleEstimate]:
@@ -144,14 +146,18 @@ def assess_placed(
         confidence = assess(graph, diagnostics, stored_calibration(), config)
         bounds = _bounds(scene, graph, diagnostics)
         confidence = replace(confidence, bounds=bounds)
-        graph = replace(graph, doubts={**_inexact(bounds, scene, config), **graph.doubts})
-        doubts = dict(graph.doubts)
-        for k, found in confidence.scans.items():
-            if found.confidence < config.confidence.min_good:
-                reason = f"its pose is right with a probability of {found.confidence:.0%} only"
-                doubts.setdefault(k, reason)
+        unsure = {
+            k: f"its pose is right with a probability of {found.confidence:.0%} only"
+            for k, found in confidence.scans.items()
+            if found.confidence < config.confidence.min_good
+        }
+        doubts = merged(
+            graph.doubts,
+            doubt_of(DoubtCode.INEXACT, _inexact(bounds, scene, config)),
+            doubt_of(DoubtCode.CONFIDENCE, unsure),
+        )
         graph = replace(graph, doubts=doubts)
-        graph = best_first(replace(graph, doubts={**doubts, **doubt_alone(graph)}))
+        graph = best_first(replace(graph, doubts=merged(doubts, doubt_alone(graph))))
         counts["doubtful"] = len(graph.doubts)
     return graph, confidence
 
@@ -202,28 +208,51 @@ def fuse_largest(
     """The surface of the first component's good scans, in its world; None without."""
     if not graph.components:
         return None
-    component = graph.components[0]
     left_out = set() if config.fusion.with_doubtful else set(graph.doubts)
-    order = sorted(set(component.poses) - left_out)
-    prepared = intake.prepared
+    order = sorted(set(graph.components[0].poses) - left_out)
     if not order:
         logger.warning("no model: all of its scans are doubtful")
         return None
+    with stages.stage("fuse") as counts:
+        mesh = _surface_of(order, intake, graph, config, stages)
+        if mesh is not None:
+            counts["faces"] = len(mesh.faces)
+    return mesh
+
+
+def preview_largest(
+    intake: Intake, graph: ViewGraph, config: Config, stages: Stages
+) -> TriangleMesh | None:
+    """The same of doubtful scans where all are doubtful, to look at; None where one is not."""
+    if not graph.components or config.fusion.with_doubtful:
+        return None
+    placed = set(graph.components[0].poses)
+    if placed - set(graph.doubts):
+        return None
+    with stages.stage("preview") as counts:
+        mesh = _surface_of(sorted(placed), intake, graph, config, stages)
+        if mesh is not None:
+            counts["faces"] = len(mesh.faces)
+    return mesh
+
+
+def _surface_of(
+    order: Sequence[int], intake: Intake, graph: ViewGraph, config: Config, stages: Stages
+) -> TriangleMesh | None:
+    """The surface of some scans of the largest component; None where they cannot be fused."""
+    component, prepared = graph.components[0], intake.prepared
     world_from_reference = component.world_from_reference(
         prepared[component.reference].scan_from_sensor
     )
-    with stages.stage("fuse") as counts:
-        try:
-            mesh = fuse(
-                [prepared[k] for k in order],
-                [world_from_reference @ component.poses[k] for k in order],
-                config.fusion,
-                prepare=config.prepare,
-                workers=stages.workers,
-                cache=stages.cache,
-            )
-        except InputError as error:
-            logger.warning("no model: %s", error)
-            return None
-        counts["faces"] = len(mesh.faces)
-    return mesh
+    try:
+        return fuse(
+            [prepared[k] for k in order],
+            [world_from_reference @ component.poses[k] for k in order],
+            config.fusion,
+            prepare=config.prepare,
+            workers=stages.workers,
+            cache=stages.cache,
+        )
+    except InputError as error:
+        logger.warning("no model: %s", error)
+        return None

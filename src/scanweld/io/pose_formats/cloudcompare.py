@@ -14,8 +14,9 @@ from scanweld.io.pose_formats.records import (
     PosedScan,
     PoseEntries,
     are_numbers,
+    attempt,
     matrix_rows,
-    parse_pose,
+    parse_words,
     printed,
     refuse_characters,
 )
@@ -44,13 +45,13 @@ def read_folder(folder: Path) -> PoseEntries:
     """The matrices of a folder and of those inside it; other files are passed over.
 
     Raises:
-        ReadError: If there are none, or one is not a rigid motion.
+        ReadError: If there are none.
     """
     entries = []
     for path in sorted(folder.rglob("*.txt"), key=lambda path: natural_key(path.as_posix())):
         text = read_text(path)
         if recognise(text):
-            pose = parse_pose(path, "the matrix", [float(word) for word in text.split()])
+            pose = attempt(parse_words, path, "the matrix", text.split())
             entries.append((path.relative_to(folder).as_posix(), pose))
     if not entries:
         raise ReadError(f"{folder}: holds no {TITLE} matrices (NAME.txt with four rows)")

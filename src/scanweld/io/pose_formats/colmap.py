@@ -3,23 +3,30 @@
 As in COLMAP's documentation (doc/format.rst): an image has two lines, ``IMAGE_ID QW QX QY QZ TX TY
 TZ CAMERA_ID NAME`` and its keypoints (none here); the pose takes the world to the camera (x right,
 y down, z away), the quaternion is Hamilton's. A pixel's centre lies at (0.5, 0.5)
-(doc/database.rst), half a pixel from scanweld's. Words end at a space, so names hold none.
+(doc/database.rst), half a pixel from scanweld's. Words end at a space, so names hold none. Far
+from the origin the world is about a local one, which a comment of ``images.txt`` tells.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld.errors import ReadError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
+from scanweld.io.local_origin import shifted
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion, quaternion
 from scanweld.io.pose_formats.records import (
+    Entry,
     Frame,
     PosedScan,
     PoseEntries,
     are_numbers,
+    attempt,
     number,
     parse_numbers,
+    read_shift,
     refuse_characters,
+    shift_lines,
 )
 
 TITLE = "COLMAP"
@@ -41,7 +48,8 @@ def read(path: Path, text: str) -> PoseEntries:
     Raises:
         ReadError: If a line is broken.
     """
-    entries: list[tuple[str | None, Pose]] = []
+    origin = read_shift(path, text)
+    entries: list[Entry] = []
     lines = enumerate(text.splitlines(), start=1)
     for count, line in lines:
         if not _is_data(line):
@@ -49,9 +57,7 @@ def read(path: Path, text: str) -> PoseEntries:
         words = line.split(maxsplit=9)
         if len(words) < 10:
             raise ReadError(f"{path}: line {count}: not an image with its pose; export it anew")
-        qw, qx, qy, qz, *shift = parse_numbers(path, f"line {count}", words[1:8])
-        camera_from_world = pose_from_quaternion(path, f"line {count}", (qx, qy, qz, qw), shift)
-        entries.append((words[9].strip(), camera_from_world.inverse()))
+        entries.append((words[9].strip(), attempt(_pose, path, count, words[1:8], origin)))
         next(lines, None)  # the keypoints, a line that may be empty
     return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=tuple(entries))
 
@@ -65,6 +71,7 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
     """
     refuse_characters(scans, [scan.name for scan in scans], " ", TITLE)
     images = [
+        *shift_lines(scans),
         "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME",
         "# POINTS2D[] as X Y POINT3D_ID: none",
     ]
@@ -83,6 +90,12 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
         "colmap/cameras.txt": "\n".join(cameras) + "\n",
         "colmap/points3D.txt": "# POINT3D_ID X Y Z R G B ERROR TRACK[]: none\n",
     }
+
+
+def _pose(path: Path, line: int, words: Sequence[str], origin: FloatArray) -> Pose:
+    qw, qx, qy, qz, *shift = parse_numbers(path, f"line {line}", words)
+    camera_from_world = pose_from_quaternion(path, f"line {line}", (qx, qy, qz, qw), shift)
+    return shifted(camera_from_world.inverse(), origin)
 
 
 def _is_data(line: str) -> bool:

@@ -17,8 +17,8 @@ from scanweld.io.pose_formats import (
     stanford,
     tum,
 )
-from scanweld.io.pose_formats.records import Frame, PosedScan, PoseEntries
-from scanweld.io.poses import read_poses, read_text
+from scanweld.io.pose_formats.records import Entry, Frame, PosedScan, PoseEntries
+from scanweld.io.poses import read_sound_poses, read_text
 
 KNOWN = (
     "poses.json of scanweld, Stanford .conf, MeshLab .mlp or .aln, TUM, COLMAP images.txt, Open3D "
@@ -85,7 +85,7 @@ def read_any_poses(path: Path) -> PoseEntries:
             matrices.
 
     Raises:
-        ReadError: If the format is unknown or ambiguous, or the file broken.
+        ReadError: If the format is unknown or ambiguous, the file broken, or all of its poses are.
     """
     if path.is_dir():
         for name in ("poses.json", "images.txt"):
@@ -119,13 +119,17 @@ def _read_json(path: Path, text: str) -> PoseEntries:
 
 def _own(path: Path) -> PoseEntries:
     """The largest component of scanweld's own format: others have frames of their own."""
-    pose_set = read_poses(path)
+    pose_set, broken = read_sound_poses(path)
     first = pose_set.components[0] if pose_set.components else ()
-    entries = tuple((name, pose_set.poses[name]) for name in first)
-    return PoseEntries(title="scanweld", frame=Frame.SCAN, entries=entries, are_paths=False)
+    entries: list[Entry] = [(name, pose_set.poses[name]) for name in first]
+    entries += broken.items()
+    return PoseEntries(title="scanweld", frame=Frame.SCAN, entries=tuple(entries), are_paths=False)
 
 
 def _not_empty(path: Path, found: PoseEntries) -> PoseEntries:
     if not found.entries:
         raise ReadError(f"{path}: holds no poses ({found.title}); give a file that does")
+    broken = [pose for _, pose in found.entries if isinstance(pose, ReadError)]
+    if len(broken) == len(found.entries):
+        raise broken[0]
     return found

@@ -1,6 +1,6 @@
 """Which pose is whose: what files of poses call scans, and what the scans are called."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from scanweld.errors import ReadError
@@ -10,6 +10,17 @@ from scanweld.io.pose_formats.records import PoseEntries, printed
 
 
 def match_poses(path: Path, found: PoseEntries, names: Sequence[str]) -> dict[str, Pose]:
+    """The poses by scan that are sound; see ``match_all_poses``.
+
+    Raises:
+        ReadError: As there.
+    """
+    return match_all_poses(path, found, names)[0]
+
+
+def match_all_poses(
+    path: Path, found: PoseEntries, names: Sequence[str]
+) -> tuple[dict[str, Pose], dict[str, ReadError]]:
     """The poses by scan; scans that the file does not name, and its poses of others, are left out.
 
     A path belongs to the one scan whose name is its end, without suffix. Where the format has no
@@ -20,13 +31,16 @@ def match_poses(path: Path, found: PoseEntries, names: Sequence[str]) -> dict[st
         found: What it says.
         names: Of all scans.
 
+    Returns:
+        Poses by scan; and of the scans whose pose is broken, what is wrong with it.
+
     Raises:
         ReadError: If two poses belong to one scan, or none to any; or if without names there are
             not as many poses as scans.
     """
     if any(label is None for label, _ in found.entries):
-        return _in_order(path, found, names)
-    poses: dict[str, Pose] = {}
+        return _parted(_in_order(path, found, names))
+    poses: dict[str, Pose | ReadError] = {}
     for label, pose in found.entries:
         name = _scan_of(str(label), names, found.are_paths)
         if name in poses:
@@ -39,10 +53,18 @@ def match_poses(path: Path, found: PoseEntries, names: Sequence[str]) -> dict[st
             f"{path}: none of its {len(found.entries)} poses (of {first}, ...) is of a scan given; "
             "the scans' files must be called as there"
         )
-    return poses
+    return _parted(poses)
 
 
-def _in_order(path: Path, found: PoseEntries, names: Sequence[str]) -> dict[str, Pose]:
+def _parted(
+    poses: Mapping[str, Pose | ReadError],
+) -> tuple[dict[str, Pose], dict[str, ReadError]]:
+    """Those that are sound, and those that are not."""
+    sound = {name: pose for name, pose in poses.items() if isinstance(pose, Pose)}
+    return sound, {name: e for name, e in poses.items() if isinstance(e, ReadError)}
+
+
+def _in_order(path: Path, found: PoseEntries, names: Sequence[str]) -> dict[str, Pose | ReadError]:
     if len(found.entries) != len(names):
         raise ReadError(
             f"{path}: {len(found.entries)} poses for {len(names)} scans, and {found.title} has no "

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld.errors import ReadError, WriteError
-from scanweld.geometry.pose import Pose
 from scanweld.io.pose_formats.records import (
+    Entry,
     Frame,
     PosedScan,
     PoseEntries,
+    attempt,
     matrix_rows,
-    parse_numbers,
-    parse_pose,
+    parse_words,
     refuse_characters,
 )
 
@@ -42,13 +42,13 @@ def read(path: Path, text: str) -> PoseEntries:
         raise ReadError(
             f"{path}: does not hold the number of scans and 6 lines for each; save it anew"
         )
-    entries: list[tuple[str | None, Pose]] = []
+    entries: list[Entry] = []
     for begin in range(1, 1 + 6 * count, 6):
         label, comment, *rows = lines[begin : begin + 6]
         if not comment.startswith("#"):
             raise ReadError(f"{path}: line {begin + 2}: does not begin with '#'; save it anew")
-        numbers = parse_numbers(path, label, " ".join(rows).split())
-        entries.append((label, parse_pose(path, label, numbers)))
+        words = " ".join(rows).split()
+        entries.append((label, attempt(parse_words, path, label, words)))
     return PoseEntries(title=TITLE, frame=Frame.SCAN, entries=tuple(entries))
 
 

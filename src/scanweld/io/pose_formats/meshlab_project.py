@@ -12,12 +12,13 @@ from xml.sax.saxutils import quoteattr
 from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
 from scanweld.io.pose_formats.records import (
+    Entry,
     Frame,
     PosedScan,
     PoseEntries,
+    attempt,
     matrix_rows,
-    parse_numbers,
-    parse_pose,
+    parse_words,
     refuse_characters,
 )
 
@@ -39,14 +40,14 @@ def read(path: Path, text: str) -> PoseEntries:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise ReadError(f"{path}: not valid XML ({error}); save the project anew") from error
-    entries: list[tuple[str | None, Pose]] = []
+    entries: list[Entry] = []
     for mesh in root.iterfind("MeshGroup/MLMesh"):
         label = mesh.get("filename") or mesh.get("label")
         if not label:
             raise ReadError(f"{path}: a mesh without a file name; save the project anew")
         words = (mesh.findtext("MLMatrix44") or "").split()
-        numbers = parse_numbers(path, label, words)
-        entries.append((label, parse_pose(path, label, numbers) if numbers else Pose.identity()))
+        pose = attempt(parse_words, path, label, words) if words else Pose.identity()
+        entries.append((label, pose))
     return PoseEntries(title=TITLE, frame=Frame.SCAN, entries=tuple(entries))
 
 

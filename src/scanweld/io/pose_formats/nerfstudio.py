@@ -13,14 +13,25 @@ from typing import Any
 import numpy as np
 
 from scanweld.errors import ReadError
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
+from scanweld.io.local_origin import shifted
 from scanweld.io.pose_formats.colmap import IMAGE_SUFFIX, PIXEL_CENTRE
-from scanweld.io.pose_formats.records import Frame, PosedScan, PoseEntries, parse_pose
+from scanweld.io.pose_formats.records import (
+    Entry,
+    Frame,
+    PosedScan,
+    PoseEntries,
+    attempt,
+    parse_pose,
+)
 from scanweld.io.poses import load_json
 
 TITLE = "nerfstudio"
 _SENSOR_FROM_OPENGL = Pose(rotation=np.diag([1.0, -1.0, -1.0]), translation=np.zeros(3))
 _FOLDER = "images/"
+_SHIFT = "shift"
+"""Our key of the local origin that the world is about where it lies far off."""
 
 
 def recognise_json(content: dict[str, Any]) -> bool:
@@ -34,10 +45,14 @@ def read(path: Path, text: str) -> PoseEntries:
     Raises:
         ReadError: If a frame has no name, or its matrix is not a rigid motion.
     """
-    frames = load_json(path, text).get("frames")
+    content = load_json(path, text)
+    frames, shift = content.get("frames"), content.get(_SHIFT, [0.0, 0.0, 0.0])
     if not isinstance(frames, list):
         raise ReadError(f"{path}: has no list of frames; write it anew")
-    entries = tuple(_entry(path, k, frame) for k, frame in enumerate(frames))
+    if not isinstance(shift, list) or not _are_three_numbers(shift):
+        raise ReadError(f"{path}: its {_SHIFT} is not three numbers; correct or remove it")
+    origin = np.array(shift, dtype=np.float64)
+    entries = tuple(_entry(path, k, frame, origin) for k, frame in enumerate(frames))
     return PoseEntries(title=TITLE, frame=Frame.SENSOR, entries=entries)
 
 
@@ -49,6 +64,8 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
     """
     frames = [_frame(scan) for scan in scans]
     content = {"camera_model": "OPENCV", "frames": frames}
+    if scans and scans[0].shift is not None:
+        content[_SHIFT] = scans[0].shift.tolist()
     return {"transforms.json": json.dumps(content, indent=1) + "\n"}
 
 
@@ -67,13 +84,22 @@ def _frame(scan: PosedScan) -> dict[str, Any]:
     }
 
 
-def _entry(path: Path, k: int, frame: Any) -> tuple[str, Pose]:
+def _are_three_numbers(values: Sequence[Any]) -> bool:
+    largest = float(np.finfo(np.float64).max)
+    return len(values) == 3 and all(type(x) in (int, float) and abs(x) < largest for x in values)
+
+
+def _entry(path: Path, k: int, frame: Any, origin: FloatArray) -> Entry:
     name = frame.get("file_path") if isinstance(frame, dict) else None
     rows = frame.get("transform_matrix") if isinstance(frame, dict) else None
     if not isinstance(name, str) or not isinstance(rows, list):
         raise ReadError(f"{path}: frame {k}: lacks file_path or transform_matrix; write it anew")
+    pose = attempt(_pose, path, name, rows, origin)
+    return name.removeprefix("./").removeprefix(_FOLDER), pose
+
+
+def _pose(path: Path, name: str, rows: Sequence[Any], origin: FloatArray) -> Pose:
     flat = [x for row in rows for x in (row if isinstance(row, list) else [row])]
     if not all(type(x) in (int, float) for x in flat):
         raise ReadError(f"{path}: {name}: the matrix holds what is no number; write it anew")
-    pose = parse_pose(path, name, flat)
-    return name.removeprefix("./").removeprefix(_FOLDER), pose @ _SENSOR_FROM_OPENGL.inverse()
+    return shifted(parse_pose(path, name, flat) @ _SENSOR_FROM_OPENGL.inverse(), origin)

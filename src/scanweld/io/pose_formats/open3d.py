@@ -14,7 +14,13 @@ import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
-from scanweld.io.pose_formats.records import Frame, PosedScan, PoseEntries, parse_pose
+from scanweld.io.pose_formats.records import (
+    Frame,
+    PosedScan,
+    PoseEntries,
+    attempt,
+    parse_pose,
+)
 from scanweld.io.poses import load_json
 
 TITLE = "Open3D PoseGraph"
@@ -37,7 +43,7 @@ def read(path: Path, text: str) -> PoseEntries:
     nodes = content.get("nodes")
     if not isinstance(nodes, list):
         raise ReadError(f"{path}: has no list of nodes; write the pose graph anew")
-    poses = [_pose(path, f"node {k}", node) for k, node in enumerate(nodes)]
+    poses = [attempt(_pose, path, f"node {k}", node) for k, node in enumerate(nodes)]
     names = content.get(_NAMES)
     if not isinstance(names, list) or [type(name) for name in names] != [str] * len(poses):
         names = [None] * len(poses)

@@ -9,11 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld.errors import ReadError
+from scanweld.geometry.pose import Pose
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion, quaternion
 from scanweld.io.pose_formats.records import (
     Frame,
     PosedScan,
     PoseEntries,
+    attempt,
     number,
     parse_numbers,
     refuse_characters,
@@ -44,10 +46,13 @@ def read(path: Path, text: str) -> PoseEntries:
                 f"{path}: line {count}: {len(words)} words, not {words[0]}, a file without spaces "
                 "and 7 numbers; correct it"
             )
-        x, y, z, qx, qy, qz, qw = parse_numbers(path, f"line {count}", words[2:])
-        pose = pose_from_quaternion(path, f"line {count}", (-qx, -qy, -qz, qw), (x, y, z))
-        entries.append((words[1], pose))
+        entries.append((words[1], attempt(_pose, path, count, words[2:])))
     return PoseEntries(title=TITLE, frame=Frame.SCAN, entries=tuple(entries))
+
+
+def _pose(path: Path, line: int, words: Sequence[str]) -> Pose:
+    x, y, z, qx, qy, qz, qw = parse_numbers(path, f"line {line}", words)
+    return pose_from_quaternion(path, f"line {line}", (-qx, -qy, -qz, qw), (x, y, z))
 
 
 def write(scans: Sequence[PosedScan]) -> dict[str, str]:

@@ -1,0 +1,76 @@
+"""Doubts about scans: every one is told, by a code that stays and in words."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from scanweld.app.model_folder import open_model
+from scanweld.app.outputs import write_outputs
+from scanweld.config import GraphConfig
+from scanweld.graph.doubts import Doubt, DoubtCode, doubt_of, merged
+from scanweld.graph.reasons import find_doubts
+from scanweld.graph.view_graph import Component
+from scanweld.reconstruction import DoubtReport, ScanReport, ScanVerdict
+from tests.results import a_result
+from tests.view_graphs import DrawnJudge, graph_with, seen, world_of
+
+CODES = [
+    *("alone", "violated", "unpaired", "mark_only", "not_refined"),
+    *("disagreement", "off_axis", "scale", "confidence"),
+]
+
+
+def test_codes_are_as_published():
+    """Programs rely on them: one may be added, none may change or go."""
+    assert [code.value for code in DoubtCode] == CODES
+    text = (Path(__file__).parents[1] / "docs/report.md").read_text(encoding="utf-8")
+    for code in CODES:
+        assert f"- `{code}`: " in text
+
+
+def test_all_doubts_about_a_scan_are_kept_and_the_weightiest_comes_first():
+    parts = [
+        doubt_of(DoubtCode.CONFIDENCE, {1: "unsure", 2: "unsure"}),
+        doubt_of(DoubtCode.VIOLATED, {1: "seen through"}),
+        doubt_of(DoubtCode.SCALE, {1: "too large"}),
+        doubt_of(DoubtCode.SCALE, {1: "told twice"}),
+    ]
+    doubts = merged(*parts)
+    assert doubts[1] == (
+        Doubt(DoubtCode.VIOLATED, "seen through"),
+        Doubt(DoubtCode.SCALE, "too large"),
+        Doubt(DoubtCode.CONFIDENCE, "unsure"),
+    )
+    assert doubts[2] == (Doubt(DoubtCode.CONFIDENCE, "unsure"),)
+    assert set(doubts) == {1, 2} and merged() == {}
+
+
+@pytest.mark.parametrize("agree", [0.5, 0.0])
+def test_a_scan_that_nothing_holds_and_others_see_through_is_doubted_for_both(agree: float):
+    world = world_of(2)
+    graph = graph_with({}, Component(poses=dict(enumerate(world)), reference=0))
+    known = doubt_of(DoubtCode.NOT_REFINED, {0: "pulled apart"})
+    graph = replace(graph, doubts=known)
+    judge = DrawnJudge(says=lambda i, j, pose: replace(seen(agree), front=0.5 - agree))
+    codes = {
+        k: [doubt.code.value for doubt in doubts]
+        for k, doubts in find_doubts(graph, judge, GraphConfig()).items()
+    }
+    through = [] if agree else ["violated"]
+    assert codes == {0: [*through, "unpaired", "not_refined"], 1: [*through, "unpaired"]}
+
+
+def test_doubts_are_written_and_read_back(tmp_path: Path):
+    told = (DoubtReport(code="scale", text="too large"), DoubtReport(code="off_axis", text="off"))
+    result = a_result(["a", "b"])
+    doubtful = ScanReport(verdict=ScanVerdict.DOUBTFUL, reason="too large", doubts=told)
+    write_outputs(replace(result, scans={**result.scans, "b": doubtful}), tmp_path)
+    scans = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["scans"]
+    assert scans["b"]["doubts"] == [
+        {"code": "scale", "text": "too large"},
+        {"code": "off_axis", "text": "off"},
+    ]
+    assert scans["a"]["doubts"] == [] and scans["b"]["reason"] == "too large"
+    assert open_model(tmp_path).report.scans["b"].doubts == told
