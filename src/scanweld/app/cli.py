@@ -6,6 +6,7 @@ than good, 130 interrupted.
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,7 +15,7 @@ import typer
 from scanweld.app import cache_commands
 from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
-from scanweld.app.options import NOT_GOOD
+from scanweld.app.options import NOT_GOOD, DepthOptions, takes
 from scanweld.errors import BudgetError, KnowledgeError, ScanweldError
 
 # What only one command needs is imported inside it: help and small commands then start at once.
@@ -32,20 +33,27 @@ app.command()(run)
 app.command()(report)
 
 
-@app.command()
-def info(
+@dataclass(frozen=True, kw_only=True)
+class InfoOptions:
+    """What ``info`` takes."""
+
     files: Annotated[
         list[str], typer.Argument(metavar="FILES...", help="Scan files, folders or glob patterns.")
-    ],
-) -> None:
+    ]
+    depth: DepthOptions
+
+
+@app.command()
+@takes(InfoOptions)
+def info(options: InfoOptions) -> None:
     """Show what was read from scan files, and what was assumed."""
-    from scanweld.io import collect, read_scan
+    from scanweld.io.depth.capture import collect_named
     from scanweld.preparation.info import describe_scan
 
     failed = False
-    for file in collect(files):
+    for file in collect_named(options.depth.named(options.files)):
         try:
-            typer.echo(describe_scan(read_scan(file.path, file.name)))
+            typer.echo(describe_scan(file.read()))
         except ScanweldError as error:
             _print_error(error)
             failed = True

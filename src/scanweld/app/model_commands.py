@@ -8,6 +8,7 @@ import typer
 
 from scanweld.app.options import (
     ConfigFile,
+    DepthOptions,
     Force,
     Inputs,
     MovedScans,
@@ -103,6 +104,7 @@ class RunOptions:
         bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
     ] = False
     surface: SurfaceOptions
+    depth: DepthOptions
     force: Force = False
     show: ShowOptions
 
@@ -129,7 +131,7 @@ def run(options: RunOptions) -> None:
                 scheduler=options.scheduler,
             )
             result = run_job(
-                options.inputs,
+                options.depth.named(options.inputs),
                 output,
                 settings,
                 knowledge=known,
