@@ -26,7 +26,7 @@ def undistorted(depth: FloatArray, camera: Camera, lens: Sequence[float]) -> Flo
     x, y = (columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy
     x, y = _through(x, y, lens)
     u, v = camera.fx * x + camera.cx, camera.fy * y + camera.cy
-    is_inside = (u > -0.5) & (v > -0.5) & (u < camera.width - 0.5) & (v < camera.height - 0.5)
+    is_inside = (u >= 0) & (v >= 0) & (u <= camera.width - 1) & (v <= camera.height - 1)
     u = np.clip(np.nan_to_num(u), 0, camera.width - 1)
     v = np.clip(np.nan_to_num(v), 0, camera.height - 1)
     nearest = depth[np.rint(v).astype(int), np.rint(u).astype(int)]

@@ -49,6 +49,7 @@ def _image(path: Path, *, depths: bool = True) -> NDArray:
 
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd tags; the picture decodes or does not
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path) as image:
                 if depths and image.mode not in _DEPTH_MODES:

@@ -12,9 +12,8 @@ from scanweld.geometry.arrays import FloatArray
 _INVALID = 65535
 """What some cameras write where they saw nothing, besides 0."""
 _ROTATED_BITS = 3
-_MOST_ROTATED = 0.9
-"""Share of values that are multiples of 8, above which their lowest bits are their highest: of
-others an eighth are."""
+_SMOOTHER = 4.0
+"""Factor by which steps between neighbours shrink, at least, if turning their bits is right."""
 _USUAL_METERS = 10.0
 """Median depth that cameras do not reach: what passes it is in finer units."""
 _METERS = (0.01, 100.0)
@@ -61,7 +60,7 @@ def find_scale(
         ReadError: If the depths that come out cannot be those of a depth camera.
     """
     values = _values(images)
-    is_rotated = _is_rotated(values)
+    is_rotated = _are_rotated(images)
     notes: tuple[str, ...] = ()
     if is_rotated:
         values = _rotated(values)
@@ -103,11 +102,22 @@ def _by_values(values: NDArray, median: float) -> float:
     return next((per for per in usual if median / per <= _USUAL_METERS), usual[-1])
 
 
-def _is_rotated(values: NDArray) -> bool:
-    if values.dtype != np.uint16 or not len(values):
+def _are_rotated(images: Sequence[NDArray]) -> bool:
+    """Whether neighbours are much nearer to each other with the bits of their depths turned back.
+
+    That makes their steps an eighth, or less; in other images it makes small steps large ones.
+    """
+    if any(values.dtype != np.uint16 for values in images):
         return False
-    low = values & (2**_ROTATED_BITS - 1)
-    return bool((low == 0).mean() > _MOST_ROTATED and (low != 0).any())
+    plain = sum(_steps(values) for values in images)
+    turned = sum(_steps(_rotated(values)) for values in images)
+    return turned * _SMOOTHER < plain
+
+
+def _steps(values: NDArray) -> int:
+    """Sum of the steps between neighbours in rows that both have a depth."""
+    both = (values[:, 1:] > 0) & (values[:, :-1] > 0)
+    return int(np.abs(np.diff(values.astype(np.int64), axis=1))[both].sum())
 
 
 def _rotated(values: NDArray) -> NDArray:
