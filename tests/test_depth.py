@@ -8,14 +8,17 @@ import pytest
 from PIL import Image
 
 from scanweld.errors import ReadError, ScanweldError
+from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io import read_scan
 from scanweld.io.depth.capture import DepthImages, DepthOptions, as_named, collect_named
 from scanweld.io.depth.intrinsics import Intrinsics, read_intrinsics
 from scanweld.io.depth.lens import _through, undistorted
-from tests.command_line import scanweld
+from tests.command_line import COARSE, scanweld
 from tests.depth_scans import bumps, scan_of_depth
+from tests.scenes import scene_of, small_creature
 
 CAMERA = Camera(
     model=CameraModel.PINHOLE, width=80, height=60, fx=90.5, fy=91.25, cx=39.5, cy=28.75
@@ -265,6 +268,43 @@ def test_bad_input_ends_with_one_line_and_nothing_written(
             (line,) = (each for each in capsys.readouterr().err.splitlines() if "error" in each)
             assert says in line, arguments
             assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_frames_become_a_model_that_is_opened_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    mesh = small_creature()
+    scene = scene_of(
+        mesh, [view_of(mesh, 35 * k, 20, 0, pixels=110) for k in range(3)], in_sensor_frames=True
+    )
+    camera = scene.scans[0].camera
+    assert camera is not None
+    per_meter = 60_000 / max(scan.points[:, 2].max() for scan in scene.scans)
+    for scan in scene.scans:
+        assert scan.grid is not None
+        depth = np.where(scan.grid >= 0, scan.points[scan.grid, 2] * per_meter, 0)
+        put(tmp_path / "depth" / f"{scan.name}.png", np.rint(depth).astype(np.uint16))
+        put(tmp_path / "masks" / f"{scan.name}.png", (depth > 0).astype(np.uint8))
+    cam = tmp_path / "depth" / "cam.txt"
+    cam.write_text(
+        f"{camera.fx} {camera.fy} {camera.cx} {camera.cy} {camera.width} {camera.height}"
+    )
+    model = tmp_path / "model"
+    said = ["--intrinsics", cam, "--masks", tmp_path / "masks", "--depth-scale", 100 * per_meter]
+    (tmp_path / "a.toml").write_text(COARSE)
+    scanweld("run", tmp_path / "depth", *said, "-o", model, "--config", tmp_path / "a.toml")
+    true = {name: pose.matrix() for name, pose in scene.world_from_scan.items()}
+    for matrix in true.values():
+        matrix[:3, 3] /= 100  # in the units of the frames
+    (tmp_path / "true.json").write_text(json.dumps({k: m.tolist() for k, m in true.items()}))
+    assert scanweld("evaluate", model / "poses.json", tmp_path / "true.json") == 0
+    assert scanweld("report", model) == 0
+    moved = (tmp_path / "depth").rename(tmp_path / "moved")
+    out = ["--poses", "tum", "--points", "all.ply", "--scans", moved]
+    assert scanweld("export", model, "-o", tmp_path / "out", *out) == 0, capsys.readouterr().err
+    points = sum(len(scan.points) for scan in scene.scans)
+    assert len(read_scan(tmp_path / "out" / "all.ply").points) == points
 
 
 def test_damaged_images_and_arrays_are_refused(tmp_path: Path):

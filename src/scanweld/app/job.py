@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scanweld.app.cache import FileCache, cache_folder
+from scanweld.app.frame_files import write_frames
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
@@ -98,6 +99,7 @@ def run_job(
         )
         places = relative_paths(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
+        write_frames(files, workspace.staging, workspace.output)
         with telling(progress, "report"):
             write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()

@@ -1,7 +1,7 @@
 """Sets of depth images: which files they are, and what was laid beside them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from numpy.typing import NDArray
@@ -94,10 +94,14 @@ class DepthImages:
         except ReadError as error:
             raise ReadError(f"{next(iter(looked_at))}: {error}") from error
         settings = FrameSettings(
-            intrinsics=intrinsics, scale=scale, max_depth=self.options.max_depth, masks=masks
+            intrinsics=intrinsics, scale=scale, max_depth=self.options.max_depth
         )
         return tuple(
-            Frame(path=path, name=printable(name), settings=settings)
+            Frame(
+                path=path,
+                name=printable(name),
+                settings=replace(settings, mask=masks.get(path)),
+            )
             for path, name in zip(paths, image_names(paths), strict=True)
         )
 

@@ -18,19 +18,19 @@ from scanweld.io.depth.scale import DepthScale
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FrameSettings:
-    """How the depth images of a set become scans.
+    """How a depth image becomes a scan.
 
     Attributes:
         intrinsics: Of the camera.
         scale: Of the values.
         max_depth: Metres beyond which all is left out; no limit if None.
-        masks: By the image, which pixels are the object; all are where it is empty.
+        mask: Image of the pixels that are the object; all are if None.
     """
 
     intrinsics: Intrinsics
     scale: DepthScale
     max_depth: float | None = None
-    masks: dict[Path, Path]
+    mask: Path | None = None
 
 
 def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
@@ -52,8 +52,8 @@ def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
     notes += (f"{100 * (1 - seen.mean()):.0f} % of the pixels are without return",)
     depth, cut = _without_far(path, depth, settings.max_depth)
     notes += cut
-    if path in settings.masks:
-        depth, cut = _masked(path, depth, settings.masks[path])
+    if settings.mask is not None:
+        depth, cut = _masked(path, depth, settings.mask)
         notes += cut
     return _scan(name, depth, camera, notes)
 
