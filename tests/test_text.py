@@ -192,6 +192,8 @@ def test_what_is_not_certain_is_refused_with_its_reason(text: str, says: str, tm
         ("1,-2,3\n4,5,6\n", [[1, -2, 3], [4, 5, 6]]),
         ("x,y,z,q,p\n1,2,3,4,5\n", [[1, 2, 3]]),
         ("x,y,q,z\n1,2,,3\n,2,3,4\n5,6,7,8\n", [[1, 2, 3], [5, 6, 8]]),
+        ("0,1,2\n0.5,1.5,2.5\n", [[0.5, 1.5, 2.5]]),  # pandas, without names
+        (",0,1,2\n0,1.5,0,1\n1,2.5,7,1\n2,.5,9,3\n", [[1.5, 0, 1], [2.5, 7, 1], [0.5, 9, 3]]),
         ("inf 0 0 1e200\ninf 1 0 inf\n1 2 3 nan\n", [[1, 2, 3]]),
         ("0 0 1e300 1e200 inf 9\n1 2 -1e200 1e200 nan -inf\n", [[0, 0, 1e300], [1, 2, -1e200]]),
         ("Export of 3 points\nfrom the big scanner\n1 2 3\n4 5 6\x1a", [[1, 2, 3], [4, 5, 6]]),

@@ -51,10 +51,12 @@ def split_head(path: Path, text: bytes) -> tuple[Head, bytes]:
     head: list[bytes] = []
     words: list[bytes] = []
     count: int | None = None
-    for line in lines:
+    for line, following in zip(lines, [*lines[1:], b""], strict=True):
         filled = without_comment(line).strip()
         cells = _cells(filled)
-        if cells and all(map(is_any_number, cells)):
+        if _are_counted_names(cells, following):
+            words.append(filled)
+        elif cells and all(map(is_any_number, cells)):
             if not (filled.isdigit() and len(filled) < 19 and count is None):
                 _check_words(path, words, len(cells))
                 break
@@ -108,12 +110,18 @@ def unknown_names(head: Head, width: int) -> str | None:
     return None
 
 
+def _are_counted_names(cells: Sequence[bytes], following: bytes) -> bool:
+    """Whether a line is 0 1 2 above fractions: what pandas writes above columns without names."""
+    counted = [str(k).encode() for k in range(len(cells))]
+    return len(cells) > 2 and list(cells) == counted and b"." in following
+
+
 def _check_words(path: Path, words: Sequence[bytes], width: int) -> None:
     """That lines of words are no points with a slip of the pen, and no other format's head."""
     for line in words:
         cells = _cells(line)
         wrong = [cell for cell in cells if not is_any_number(cell)]
-        if len(cells) == width and 2 * len(wrong) < width:
+        if len(cells) == width and wrong and 2 * len(wrong) < width:
             raise ReadError(
                 f"{path}: {_decoded(wrong[0])!r} in its first line of numbers is not a number; "
                 "correct it or export it anew"
