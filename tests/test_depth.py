@@ -1,6 +1,7 @@
 """Depth images as scans: whatever form they and their intrinsics have, the points are the same."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +115,7 @@ distortion_coefficients: {rows: 1, cols: 5, data: [%s]}
     [
         (TEXT, PLAIN),
         (f"# fx fy cx cy width height\n{TEXT} 80 60\n", SIZED),
-        (f"80, 60, {TEXT.replace(' ', ', ')}", SIZED),
+        (f"{TEXT.replace(' ', ', ')}, 80, 60", SIZED),
         ("fx=90.5 fy=91.25\ncx: 39.5\ncy: 28.75\nwidth = 80, height = 60", SIZED),
         ("90.5 0 39.5\n0 91.25 28.75\n0 0 1\n", PLAIN),
         ("90.5 0 39.5 0\n0 91.25 28.75 0\n0 0 1 0\n0 0 0 1", PLAIN),
@@ -149,6 +150,7 @@ def test_lens_and_scale_come_with_the_intrinsics(tmp_path: Path):
         ("", "no numbers in it"),
         ("1 2 3", "3 numbers, not 4"),
         ("525 525 319 239 640 480 0", "7 numbers"),
+        (f"80 60 {TEXT}", "width and height are no whole numbers"),
         ("fx=525 fy=525", "no cx cy"),
         ("-525 525 319 239", "must be positive"),
         ("{", "no intrinsics that can be used"),
@@ -274,10 +276,10 @@ def test_bad_input_ends_with_one_line_and_nothing_written(
 def test_frames_become_a_model_that_is_opened_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
-    mesh = small_creature()
-    scene = scene_of(
-        mesh, [view_of(mesh, 35 * k, 20, 0, pixels=110) for k in range(3)], in_sensor_frames=True
-    )
+    views = [view_of(small_creature(), 35 * k, 20, 0, pixels=110) for k in range(3)]
+    largest = max((view.camera for view in views), key=lambda camera: camera.width)
+    views = [replace(view, camera=largest) for view in views]
+    scene = scene_of(small_creature(), views, in_sensor_frames=True)
     camera = scene.scans[0].camera
     assert camera is not None
     per_meter = 60_000 / max(scan.points[:, 2].max() for scan in scene.scans)
@@ -287,9 +289,8 @@ def test_frames_become_a_model_that_is_opened_again(
         put(tmp_path / "depth" / f"{scan.name}.png", np.rint(depth).astype(np.uint16))
         put(tmp_path / "masks" / f"{scan.name}.png", (depth > 0).astype(np.uint8))
     cam = tmp_path / "depth" / "cam.txt"
-    cam.write_text(
-        f"{camera.fx} {camera.fy} {camera.cx} {camera.cy} {camera.width} {camera.height}"
-    )
+    numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
+    cam.write_text(" ".join(map(str, numbers)))
     model = tmp_path / "model"
     said = ["--intrinsics", cam, "--masks", tmp_path / "masks", "--depth-scale", 100 * per_meter]
     (tmp_path / "a.toml").write_text(COARSE)

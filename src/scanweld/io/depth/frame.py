@@ -15,6 +15,9 @@ from scanweld.io.depth.lens import undistorted
 from scanweld.io.depth.pixels import read_mask, read_pixels
 from scanweld.io.depth.scale import DepthScale
 
+_FAR_OFF = 0.3
+"""Distance of a camera's centre from the middle of its image, in widths, that is worth a note."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FrameSettings:
@@ -43,6 +46,8 @@ def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
     values = read_pixels(path)
     camera = camera_of(path, settings.intrinsics, (values.shape[0], values.shape[1]))
     depth, notes = settings.scale.depth(values), settings.scale.notes
+    if max(_off_middle(settings.intrinsics, camera.width, camera.height)) > _FAR_OFF:
+        notes += ("the camera's centre is far from the middle: are these its intrinsics?",)
     seen = np.isfinite(depth)
     if not seen.any():
         raise ReadError(f"{path}: no pixel has a depth; leave it out")
@@ -71,7 +76,7 @@ def camera_of(path: Path, intrinsics: Intrinsics, shape: tuple[int, int]) -> Cam
             f"{path}: has {width} x {height} pixels, the intrinsics are for {size[0]} x {size[1]}; "
             "give those of the depth images"
         )
-    if not (0 <= intrinsics.cx < width and 0 <= intrinsics.cy < height):
+    if max(_off_middle(intrinsics, width, height)) > 1:
         raise ReadError(
             f"{path}: has {width} x {height} pixels, but the intrinsics' centre is at "
             f"{intrinsics.cx:g}, {intrinsics.cy:g}; give those of the depth images"
@@ -85,6 +90,11 @@ def camera_of(path: Path, intrinsics: Intrinsics, shape: tuple[int, int]) -> Cam
         cx=intrinsics.cx,
         cy=intrinsics.cy,
     )
+
+
+def _off_middle(intrinsics: Intrinsics, width: int, height: int) -> tuple[float, float]:
+    """How far the centre is from the middle of the image, in widths and heights."""
+    return abs(intrinsics.cx / width - 0.5), abs(intrinsics.cy / height - 0.5)
 
 
 def read_mask_of(path: Path, mask: Path, shape: tuple[int, ...]) -> BoolArray:

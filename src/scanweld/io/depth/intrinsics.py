@@ -146,22 +146,15 @@ def _of_matrix(numbers: Any) -> Intrinsics:
 
 
 def _of_numbers(numbers: list[float]) -> Intrinsics:
-    """Of numbers alone: fx fy cx cy, with width height before or behind, or a matrix."""
+    """Of numbers alone: fx fy cx cy, with width height behind, or a matrix."""
     if len(numbers) in (9, 16):
         return _of_matrix(numbers)
     if len(numbers) not in (4, 6):
         raise ValueError(f"{len(numbers)} numbers, not 4 (fx fy cx cy), 6, 9 or 16 (a matrix)")
-    options = []
-    for sizes, four in ((numbers[4:], numbers[:4]), (numbers[:2], numbers[2:])):
-        whole = all(size == round(size) and size > 0 for size in sizes)
-        if whole and (len(numbers) == 4 or (0 < four[2] < sizes[0] and 0 < four[3] < sizes[1])):
-            options.append((four, sizes if len(numbers) == 6 else (None, None)))
-    if len(options) < 1 or (len(options) > 1 and len(numbers) == 6):
-        raise ValueError("unclear which of the 6 numbers are width and height")
-    (fx, fy, cx, cy), (width, height) = options[0]
-    if width is None or height is None:
-        return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy)
-    return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=int(width), height=int(height))
+    if any(size != round(size) for size in numbers[4:]):
+        raise ValueError("width and height are no whole numbers; they come last")
+    names = ("fx", "fy", "cx", "cy", "width", "height")
+    return _of_names(dict(zip(names, numbers, strict=False)))
 
 
 def _of_colmap(cameras: list[list[str]]) -> Intrinsics:
