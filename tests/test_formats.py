@@ -146,9 +146,6 @@ def test_three_more_columns_are_normals_or_colors(tmp_path: Path):
     colors = read_scan(put(tmp_path / "b.xyz", "0 0 0 0 0 0\n1 0 0 255 16 1\n"))
     assert colors.colors is not None and colors.normals is None
     np.testing.assert_array_equal(colors.colors, [[0, 0, 0], [255, 16, 1]])
-    parts = read_scan(put(tmp_path / "c.pts", "2\n0 0 0 -5 0 0 0\n1 0 0 7 0.2 0.4 1\n"))
-    assert parts.colors is not None
-    np.testing.assert_array_equal(parts.colors, [[0, 0, 0], [51, 102, 255]])
 
 
 @pytest.mark.parametrize(
@@ -157,11 +154,9 @@ def test_three_more_columns_are_normals_or_colors(tmp_path: Path):
         ("a.xyz", "# only\n", "holds no points"),
         ("a.xyz", "0 0 0\n1 0\n", "line 2: 2 numbers where the lines before have 3"),
         ("a.xyz", "# hello\n0 0 0\n1 o 0\n", "line 3: 'o' is not a number"),
-        ("a.xyz", "Our scans\nare in the folder.\n", "line 2: 'are' is not a number"),
+        ("a.xyz", "Our scans\nare in the folder.\n", "line 1: 'Our' is not a number"),
         ("a.xyz", "5\n0 0 0\n1 1 1\n", "2 points but says 5"),
         ("a.xyz", "0 0\n1 1\n", "2 columns"),
-        ("a.xyz", "0 0 0 300 900 1\n", "neither unit normals nor colours"),
-        ("a.csv", "0,5;1,5;2,5\n", "commas and semicolons"),
         ("a.obj", "f 1 2 3\n", "no vertices"),
         ("a.obj", "v 0 0 0\nv 1 x 0\n", "line 2: 'v 1 x 0' is broken"),
         ("a.obj", "v 0 0 0\nf 0 1 1\n", "line 2: 'f 0 1 1' is broken"),
@@ -200,7 +195,7 @@ SEEDS = {
     "a.obj": obj_text(TETRAHEDRON, FACES).encode(),
     "a.off": off_text(TETRAHEDRON, FACES).encode(),
     "a.stl": stl_bytes(TETRAHEDRON[FACES]),
-    "a.xyz": b"3\n0 0 1 0 1 0\n1,0,2,1,0,0\n0;1;3;0;0;1\n",
+    "a.xyz": b"3\nx;y;z;nx;ny;nz\n0;0,5;1;0;1;0\n1;0;2;1;0;0\n0;1;3;0;0;1\n",
 }
 
 

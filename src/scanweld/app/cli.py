@@ -3,6 +3,7 @@
 import gc
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,7 +12,7 @@ import typer
 from scanweld.app import cache_commands
 from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
-from scanweld.app.options import without_collecting
+from scanweld.app.options import DepthOptions, takes, without_collecting
 from scanweld.errors import BudgetError, ExitCode, KnowledgeError, ScanweldError
 
 # What only one command needs is imported inside it: help and small commands then start at once.
@@ -26,23 +27,30 @@ app.command()(run)
 app.command()(report)
 
 
-@app.command()
-@without_collecting()
-def info(
+@dataclass(frozen=True, kw_only=True)
+class InfoOptions:
+    """What ``info`` takes."""
+
     files: Annotated[
         list[str], typer.Argument(metavar="FILES...", help="Scan files, folders or glob patterns.")
-    ],
-) -> None:
+    ]
+    depth: DepthOptions
+
+
+@app.command()
+@takes(InfoOptions)
+@without_collecting()
+def info(options: InfoOptions) -> None:
     """Show what was read from scan files, and what was assumed."""
-    from scanweld.io import collect, read_scan
+    from scanweld.io.depth.capture import collect_named
     from scanweld.preparation.info import describe_scan
     from scanweld.work.threads import single_threaded_algebra
 
     failed = False
     with single_threaded_algebra():  # to wake threads takes longer than what they would do
-        for file in collect(files):
+        for file in collect_named(options.depth.named(options.files)):
             try:
-                typer.echo(describe_scan(read_scan(file.path, file.name)))
+                typer.echo(describe_scan(file.read()))
             except ScanweldError as error:
                 _print_error(error)
                 failed = True

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scanweld.app.cache import FileCache, cache_folder
+from scanweld.app.frame_files import write_frames
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
@@ -15,7 +16,8 @@ from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import ScanFile, collect, path_from, printable, read_scan
+from scanweld.io import ScanFile, path_from, printable
+from scanweld.io.depth.capture import DepthImages, collect_named
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline import run as pipeline
 from scanweld.preparation.thinning import thinned
@@ -50,7 +52,7 @@ NO_LIMITS = Limits()
 
 
 def run_job(
-    inputs: Sequence[Path | str],
+    inputs: Sequence[Path | str] | DepthImages,
     output: Path | str,
     config: Config | None = None,
     *,
@@ -62,7 +64,7 @@ def run_job(
     """Read scans, register and fuse them, and write what was found out: ``scanweld run``.
 
     Args:
-        inputs: Files, folders and glob patterns.
+        inputs: Files, folders and glob patterns; or depth images with what is known of them.
         output: The folder to be made; it appears when it is whole.
         config: Settings; the defaults if not given.
         knowledge: What is known of the scans beforehand.
@@ -74,7 +76,7 @@ def run_job(
         ScanweldError: If there is too little to work on, the output cannot be written, or there is
             no such cluster. Files that cannot be read are named in the result instead.
     """
-    files, workers, memory = collect(inputs), limits.workers, limits.memory
+    files, workers, memory = collect_named(inputs), limits.workers, limits.memory
     paths = [file.path for file in files]
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
@@ -97,6 +99,7 @@ def run_job(
         )
         places = relative_paths(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
+        write_frames(files, workspace.staging, workspace.output)
         with telling(progress, "report"):
             write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()
@@ -127,7 +130,7 @@ def read_all(
     with telling(progress, "read") as counts:
         for done, file in enumerate(files, start=1):
             try:
-                scan = read_scan(file.path, file.name)
+                scan = file.read()
                 scans.append(scan if max_points is None else thinned(scan, max_points))
             except ReadError as error:
                 unreadable[file.name] = printable(str(error))

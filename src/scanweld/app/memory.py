@@ -26,7 +26,7 @@ NUM_PLANNED = 2
 """Workers that there is room for in any case."""
 READING = 30 * MEGABYTE
 """What reading a file takes, whatever its size,"""
-PER_FILE_BYTE = {".ply": 6, ".stl": 8, ".obj": 9, ".off": 21}
+PER_FILE_BYTE = {".ply": 6, ".stl": 8, ".obj": 9, ".off": 21, ".png": 200}
 PER_TEXT_BYTE = 7
 """and for each of its bytes."""
 MIN_POINTS = 20_000

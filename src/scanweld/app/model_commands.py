@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scanweld.app.options import (
-    NOT_GOOD,
     ConfigFile,
+    DepthOptions,
     Force,
     Inputs,
     MovedScans,
@@ -102,6 +102,7 @@ class RunOptions:
         bool, typer.Option("--with-doubtful", help="Make doubtful scans part of the model too.")
     ] = False
     surface: SurfaceOptions
+    depth: DepthOptions
     force: Force = False
     show: ShowOptions
 
@@ -134,7 +135,7 @@ def run(options: RunOptions) -> None:
                 scheduler=options.scheduler,
             )
             result = run_job(
-                options.inputs,
+                options.depth.named(options.inputs),
                 output,
                 settings,
                 knowledge=known,
@@ -225,4 +226,4 @@ def export(options: ExportOptions) -> None:
     made = export_model(options.model_dir, options.output, options.wanted, force=options.force)
     lines = [f"{options.output}: {', '.join(made.files)}", *made.notes]
     typer.echo("\n".join([*lines, *made.left_out]))
-    raise typer.Exit(NOT_GOOD if made.left_out else 0)
+    raise typer.Exit(ExitCode.NOT_GOOD if made.left_out else ExitCode.GOOD)

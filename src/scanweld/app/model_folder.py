@@ -5,12 +5,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from scanweld.app.frame_files import read_frames
 from scanweld.app.model_files import Files, Graph, Report, read_entries
 from scanweld.config import Unit, load_config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
+from scanweld.io.depth.frame import FrameSettings, read_frame
+from scanweld.io.depth.images import depth_images, image_names
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.thinning import thinned
 from scanweld.reconstruction import Reconstruction, ScanVerdict
@@ -104,7 +107,7 @@ class ModelFolder:
         self, names: Iterable[str], given: Sequence[Path | str] = ()
     ) -> tuple[dict[str, Path], dict[str, InputError]]:
         """The same, and of each scan whose file is not there, why that is so."""
-        known = {file.name: file.path for file in collect(given)} if given else self._told_files()
+        known = self._given_files(given) if given else self._told_files()
         found: dict[str, Path] = {}
         missing: dict[str, InputError] = {}
         for name in names:
@@ -128,7 +131,7 @@ class ModelFolder:
             InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        return {name: self._as_taken(read_scan(path, name)) for name, path in files.items()}
+        return {name: self._as_taken(self._read(name, path)) for name, path in files.items()}
 
     def read_whole_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
         """The same with all of their points.
@@ -137,10 +140,14 @@ class ModelFolder:
             InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        scans = {name: read_scan(path, name) for name, path in files.items()}
+        scans = {name: self._read(name, path) for name, path in files.items()}
         for scan in scans.values():
             self._as_taken(scan)
         return scans
+
+    def _read(self, name: str, path: Path) -> RangeScan:
+        settings = self._frames.get(name)
+        return read_scan(path, name) if settings is None else read_frame(path, name, settings)
 
     def _as_taken(self, scan: RangeScan) -> RangeScan:
         """A scan as the model's maker took it, after making sure that it is the same one."""
@@ -154,9 +161,19 @@ class ModelFolder:
         return taken
 
     @cached_property
+    def _frames(self) -> dict[str, FrameSettings]:
+        return read_frames(self.path)
+
+    @cached_property
     def _files(self) -> Files:
         report = self.path / "report.json"
         return read_entries(report, Files) if report.is_file() else Files(scans={})
+
+    def _given_files(self, given: Sequence[Path | str]) -> Mapping[str, Path]:
+        if not self._frames:
+            return {file.name: file.path for file in collect(given)}
+        images = depth_images(given)
+        return dict(zip(image_names(images), images, strict=True))
 
     def _told_files(self) -> Mapping[str, Path]:
         scans = self._files.scans

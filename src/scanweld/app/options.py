@@ -1,7 +1,7 @@
 """What commands take: options as records, and those that several commands share."""
 
 import gc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from enum import StrEnum
@@ -15,6 +15,7 @@ import typer
 from scanweld.choices import Holes, Unit
 
 if TYPE_CHECKING:
+    from scanweld.io.depth.capture import DepthImages
     from scanweld.reconstruction import Reconstruction
     from scanweld.work.progress import Progress
 
@@ -140,6 +141,38 @@ class SurfaceOptions:
     def settings(self) -> dict[str, Any]:
         """Settings of the section ``fusion``; None, or left out, where an option is not given."""
         return {**vars(self), "watertight": self.watertight or None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthOptions:
+    """What is said of depth images."""
+
+    intrinsics: Annotated[
+        Path | None, typer.Option(help="Of the camera of depth images: a file, see docs/depth.md.")
+    ] = None
+    depth_scale: Annotated[
+        float | None, typer.Option(min=1e-6, help="Depth values in a metre; found out if it can.")
+    ] = None
+    depth_max: Annotated[
+        float | None, typer.Option(min=0.0, help="Metres beyond which depths are left out.")
+    ] = None
+    masks: Annotated[
+        Path | None, typer.Option(help="Folder with a mask for each depth image: the object.")
+    ] = None
+
+    def named(self, inputs: list[str]) -> "Sequence[Path | str] | DepthImages":
+        """What a user names: files, or depth images."""
+        from scanweld.io.depth import capture
+
+        return capture.as_named(
+            inputs,
+            capture.DepthOptions(
+                intrinsics=self.intrinsics,
+                scale=self.depth_scale,
+                max_depth=self.depth_max,
+                masks=self.masks,
+            ),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from scanweld.errors import InputError, ReadError
+from scanweld.geometry.scan import RangeScan
 from scanweld.io.names import natural_key, printable
 from scanweld.io.not_scans import foreign_kind, inventory, why_unread
-from scanweld.io.read import READERS
+from scanweld.io.read import READERS, read_scan
 
 logger = logging.getLogger(__name__)
 
@@ -24,6 +25,14 @@ class ScanFile:
 
     path: Path
     name: str
+
+    def read(self) -> RangeScan:
+        """Read the scan.
+
+        Raises:
+            ReadError: If it cannot be read.
+        """
+        return read_scan(self.path, self.name)
 
 
 def collect(inputs: Sequence[Path | str]) -> tuple[ScanFile, ...]:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io.coarseness import refuse_coarse
+from scanweld.io.no_points import grid_in_order, seen_points
 
 logger = logging.getLogger(__name__)
 
@@ -49,43 +50,50 @@ class RawScan:
 
 
 def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
-    """The scan of a file: points that are not finite dropped, grid and faces re-indexed.
+    """The scan of a file: points that are none dropped, grid and faces re-indexed.
 
-    Points that lie in no cell of the grid are kept, and the scan's notes count them. Normals and
-    confidences that are not finite become zero: nothing is known there.
+    They stand for pixels that saw nothing, see ``seen_points``; where it is certain how many pixels
+    make a row, the scan gets its grid. Points that lie in no cell of a grid are kept, and the
+    scan's notes count them. Normals and confidences that are not finite become zero: nothing is
+    known there.
 
     Raises:
-        ReadError: If an index names no point, no finite point is left, or coordinates come in too
-            large steps.
+        ReadError: If an index names no point, no point is left, or coordinates come in too large
+            steps.
     """
-    finite = _checked(path, raw)
-    dropped = int((~finite).sum())
-    if dropped == len(finite):
+    _check_indices(path, raw)
+    seen, notes = seen_points(raw.points, raw.faces)
+    dropped = int((~seen).sum())
+    if dropped == len(seen):
         raise ReadError(f"{path}: holds no points, or none that is finite; leave it out")
-    points = raw.points[finite] if dropped else raw.points
+    points = raw.points[seen] if dropped else raw.points
     refuse_coarse(path, points, are_vertices=raw.faces is not None and len(raw.faces) > 0)
-    grid, faces = raw.grid, raw.faces if raw.faces is not None and len(raw.faces) else None
+    notes = raw.notes + notes
+    grid = raw.grid
+    if dropped and grid is None and raw.faces is None and raw.camera is None:
+        grid = grid_in_order(raw.points, seen)
+        notes += () if grid is None else ("the points stand in rows, which were read as a grid",)
+    faces = raw.faces if raw.faces is not None and len(raw.faces) else None
     if dropped:
-        new_index = np.where(finite, np.cumsum(finite) - 1, -1)
+        new_index = np.where(seen, np.cumsum(seen) - 1, -1)
         grid = None if grid is None else np.where(grid >= 0, new_index[grid], -1)
         faces = None if faces is None else _whole(new_index[faces])
     colors = raw.colors
-    notes = raw.notes
     if colors is None and raw.intensity is not None:
         colors = np.repeat(raw.intensity[:, None], 3, axis=1)
         notes += ("intensity read as grey",)
-    if grid is not None and (loose := _num_loose(grid, int(finite.sum()))):
+    if grid is not None and (loose := _num_loose(grid, int(seen.sum()))):
         notes += (f"{loose} points lie in no cell of the grid",)
     if dropped:
-        logger.info("%s: %d points that are not finite dropped", path, dropped)
+        logger.info("%s: %d points dropped", path, dropped)
     return RangeScan(
         name=name,
         points=points,
         grid=grid,
         faces=faces,
-        normals=None if raw.normals is None else _zero_unless_finite(raw.normals[finite]),
-        colors=None if colors is None else colors[finite],
-        confidence=None if raw.confidence is None else _zero_unless_finite(raw.confidence[finite]),
+        normals=None if raw.normals is None else _zero_unless_finite(raw.normals[seen]),
+        colors=None if colors is None else colors[seen],
+        confidence=None if raw.confidence is None else _zero_unless_finite(raw.confidence[seen]),
         camera=raw.camera,
         scan_from_sensor=raw.scan_from_sensor,
         viewpoint=Viewpoint.UNKNOWN if raw.scan_from_sensor is None else Viewpoint.GIVEN,
@@ -100,7 +108,8 @@ def to_mesh(path: Path, raw: RawScan) -> TriangleMesh:
     Raises:
         ReadError: If an index names no vertex, or no face is left.
     """
-    finite = _checked(path, raw)
+    _check_indices(path, raw)
+    finite = np.asarray(np.isfinite(raw.points).all(axis=1))
     new_index = np.where(finite, np.cumsum(finite) - 1, -1)
     faces = np.zeros((0, 3), np.int64) if raw.faces is None else _whole(new_index[raw.faces])
     if not len(faces):
@@ -153,8 +162,8 @@ def to_bytes(values: NDArray, type_code: str = "") -> ByteArray | None:
     return np.rint(np.minimum(scaled, 255.0)).astype(np.uint8)
 
 
-def _checked(path: Path, raw: RawScan) -> BoolArray:
-    """Which points are finite, after making sure that all indices name points."""
+def _check_indices(path: Path, raw: RawScan) -> None:
+    """Make sure that all indices name points."""
     for what, indices, lowest in (("range grid cells", raw.grid, -1), ("faces", raw.faces, 0)):
         if indices is None or not indices.size:
             continue
@@ -164,7 +173,6 @@ def _checked(path: Path, raw: RawScan) -> BoolArray:
                     f"{path}: its {what} name point {index}, but points go from 0 to "
                     f"{len(raw.points) - 1}; export it anew"
                 )
-    return np.asarray(np.isfinite(raw.points).all(axis=1))
 
 
 def _whole(faces: IntArray) -> IntArray:

@@ -1,118 +1,97 @@
 """Points as text, one a line: XYZ, PTS, ASC, TXT, CSV."""
 
-import logging
-import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
-from scanweld.io.raw import RawScan, to_bytes
-from scanweld.io.text import is_number, parse_numbers, words_per_line
-
-logger = logging.getLogger(__name__)
-
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_SEPARATORS = bytes.maketrans(b",;", b"  ")
-_COMMENT = re.compile(rb"(^|\s)(#|//).*$", re.DOTALL)
-"""Not inside a word: some libraries print NaN as 1.#QNAN."""
-_MIXED = re.compile(rb",[^\r\n]*;|;[^\r\n]*,")
-_FILLED_LINE = re.compile(rb"[^\r\n]*[^\s][^\r\n]*")
-_WIDTHS = (3, 4, 6, 7)
+from scanweld.io.raw import RawScan
+from scanweld.io.text import parse_numbers, words_per_line
+from scanweld.io.text_columns import (
+    Columns,
+    columns_by_name,
+    is_index,
+    is_known,
+    scan_of_columns,
+)
+from scanweld.io.text_encoding import plain_text
+from scanweld.io.text_head import Head, column_names, split_head, unknown_names, without_comment
+from scanweld.io.text_separators import with_spaces
+from scanweld.io.text_values import columns_by_values
 
 
 def read_xyz(path: Path, data: bytes) -> RawScan:
-    """Points with x, y, z; x, y, z and a normal or a colour; or with an intensity behind z.
+    """Points with x, y, z and whatever else columns with names hold.
 
-    Numbers are separated by white space, commas or semicolons. Comments begin with ``#`` or
-    ``//``; one line of column names and one of the number of points may come first. Three
-    further columns are normals if all of them are unit vectors, else colours.
+    Numbers are separated by white space, commas or semicolons, decimals with a point or, where
+    that is certain, with a comma. Comments begin with ``#`` or ``//``. Column names, the number of
+    points and a few lines of words may stand above. Without names the first three columns are
+    x y z, behind a column that counts if there is one; others are read where they can only be unit
+    normals or colours from 0 to 255. Notes tell what was ignored or concluded.
 
     Raises:
-        ReadError: If a line, the number of columns or the number of points is wrong.
+        ReadError: If something is no number, lines or the number of points are wrong, or it is not
+            certain what the columns or commas mean.
     """
-    text = data.removeprefix(_BYTE_ORDER_MARK)
+    head, text = split_head(path, plain_text(path, data))
     if b"#" in text or b"//" in text:
-        text = b"\n".join(_COMMENT.sub(b"", line) for line in text.splitlines())
-    if b"," in text and b";" in text and _MIXED.search(text):
+        text = b"\n".join(map(without_comment, text.splitlines()))
+    first_line = len(head.lines) + 1
+    named = [len(names) for names in head.names()]
+    text, has_commas = with_spaces(path, text, named, first_line)
+    table = _table(path, text, first_line)
+    if head.count is not None and head.count != len(table):
         raise ReadError(
-            f"{path}: commas and semicolons in one line; write decimals with a point and separate "
-            "the numbers by either"
+            f"{path}: holds {len(table)} points but says {head.count} (truncated, or a wrong "
+            "count); copy it again or export it anew"
         )
-    text = _without_column_names(path, text.translate(_SEPARATORS))
-    text, promised = _take_count(text)
-    table = _table(path, text)
-    if promised is not None and promised != len(table):
-        raise ReadError(
-            f"{path}: holds {len(table)} points but says {promised} (truncated, or a wrong count); "
-            "copy it again or export it anew"
-        )
-    return _raw_scan(path, table)
+    raw = scan_of_columns(table, _columns(path, head, table))
+    notes = ("decimal commas read as points",) if has_commas else ()
+    skipped = [line for line in head.words if not column_names(line)]
+    notes += tuple(f"line above the numbers skipped: {line!r}" for line in skipped)
+    return replace(raw, notes=notes + raw.notes)
 
 
-def _without_column_names(path: Path, text: bytes) -> bytes:
-    """The text, the first line that holds anything blanked if it is made of names such as x y z."""
-    first = _FILLED_LINE.search(text)
-    if first is None or any(is_number(word) for word in first[0].split()):
-        return text
-    names = first[0].decode(errors="replace").strip()
-    logger.info("%s: column names %r skipped", path, names)
-    return text[: first.start()] + text[first.end() :]
-
-
-def _take_count(text: bytes) -> tuple[bytes, int | None]:
-    """The text and the number of points where it stands first, alone in its line; blanks that."""
-    first = _FILLED_LINE.search(text)
-    if first is None or not first[0].strip().isdigit() or not text[first.end() :].strip():
-        return text, None
-    return text[: first.start()] + text[first.end() :], int(first[0])
-
-
-def _table(path: Path, text: bytes) -> FloatArray:
+def _table(path: Path, text: bytes, first_line: int) -> FloatArray:
     """All numbers (N, columns)."""
     sizes = words_per_line(text)
     filled = np.flatnonzero(sizes)
     if not len(filled):
         raise ReadError(f"{path}: holds no points; leave it out")
     # Before the widths: prose is better described by its first word than by their number.
-    numbers = parse_numbers(path, text)
+    numbers = parse_numbers(path, text, first_line)
     width = int(sizes[filled[0]])
     odd = filled[sizes[filled] != width]
     if len(odd):
         raise ReadError(
-            f"{path}: line {odd[0] + 1}: {sizes[odd[0]]} numbers where the lines before have "
-            f"{width}; correct it or export it anew"
-        )
-    if width not in _WIDTHS:
-        raise ReadError(
-            f"{path}: {width} columns; scanweld reads 3 (x y z), 4 (and intensity), 6 (x y z and "
-            "normal or colour) or 7 (x y z intensity colour)"
+            f"{path}: line {odd[0] + first_line}: {sizes[odd[0]]} numbers where the lines before "
+            f"have {width}; correct it or export it anew"
         )
     return numbers.reshape(-1, width)
 
 
-def _raw_scan(path: Path, table: FloatArray) -> RawScan:
+def _columns(path: Path, head: Head, table: FloatArray) -> Columns:
+    """What the columns mean, by the names above them or by their values."""
     width = table.shape[1]
-    last = table[:, -3:]
-    has_normals = width == 6 and _are_unit_vectors(last)
-    has_colors = width >= 6 and not has_normals
-    colors = to_bytes(last) if has_colors else None
-    if has_colors and colors is None:
+    for names in head.names():
+        if len(names) == width:
+            return columns_by_name(path, names)
+        if len(names) == width - 1 and is_index(table[:, 0]):
+            return columns_by_name(path, ("", *names))
+        if names[:3] != ("x", "y", "z") or (len(names) > 3 and all(map(is_known, names))):
+            raise ReadError(
+                f"{path}: {len(names)} column names ({' '.join(names)}) above {width} columns; "
+                "name each column once, or remove the line"
+            )
+    line = unknown_names(head, width)
+    if line in head.words:
         raise ReadError(
-            f"{path}: its last three columns are neither unit normals nor colours (0 to 255, or 0 "
-            "to 1); export x y z only"
+            f"{path}: no x, y and z among its column names {line!r}; call three columns so, or "
+            "remove the line"
         )
-    return RawScan(
-        points=table[:, :3],
-        normals=last if has_normals else None,
-        colors=colors,
-        intensity=to_bytes(table[:, 3]) if width in (4, 7) else None,
-    )
-
-
-def _are_unit_vectors(vectors: FloatArray) -> bool:
-    """Whether all vectors (N, 3) are of length 1, to two digits, or zero (unknown)."""
-    lengths = np.linalg.norm(vectors, axis=1)
-    known = np.isfinite(lengths) & (lengths > 0)
-    return bool(known.any() and (np.abs(lengths[known] - 1) < 0.02).all())
+    columns = columns_by_values(path, table)
+    if line is None:
+        return columns
+    return replace(columns, notes=(f"not understood as column names: {line!r}", *columns.notes))

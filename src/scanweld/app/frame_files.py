@@ -1,0 +1,57 @@
+"""frames.json: how the depth images of a run were read, so that they can be read again."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from scanweld.app.json_text import json_text
+from scanweld.errors import ReadError
+from scanweld.io import ScanFile, path_from, write_whole
+from scanweld.io.depth.capture import Frame
+from scanweld.io.depth.frame import FrameSettings
+from scanweld.io.poses import load_json, read_text
+
+FRAMES = "frames.json"
+_SETTINGS = TypeAdapter(dict[str, FrameSettings])
+
+
+def write_frames(files: Sequence[ScanFile], folder: Path, final: Path) -> None:
+    """Write how depth images were read; nothing where no file is one.
+
+    Args:
+        files: Of all scans.
+        folder: Where to write.
+        final: Where that folder will be, from which the masks are seen.
+
+    Raises:
+        WriteError: If the file cannot be written.
+    """
+    frames = {}
+    for file in files:
+        if isinstance(file, Frame):
+            mask = file.settings.mask
+            seen_from = None if mask is None else path_from(final, mask)
+            frames[file.name] = asdict(file.settings) | {"mask": seen_from}
+    if frames:
+        write_whole(folder / FRAMES, json_text(frames).encode())
+
+
+def read_frames(folder: Path) -> dict[str, FrameSettings]:
+    """How depth images were read, by the scans' names; empty where none were.
+
+    Raises:
+        ReadError: If the file is broken.
+    """
+    path = folder / FRAMES
+    if not path.is_file():
+        return {}
+    try:
+        found = _SETTINGS.validate_python(load_json(path, read_text(path)))
+    except (ValidationError, ValueError) as error:
+        raise ReadError(f"{path}: is broken; run scanweld again to write it anew") from error
+    return {
+        name: frame if frame.mask is None else replace(frame, mask=folder / frame.mask)
+        for name, frame in found.items()
+    }

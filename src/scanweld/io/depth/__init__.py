@@ -1,0 +1,1 @@
+"""Depth images of cameras whose intrinsics are known, as scans."""

@@ -1,0 +1,112 @@
+"""What the columns of a text mean: their names, and the scan that they make."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scanweld.errors import ReadError
+from scanweld.geometry.arrays import FloatArray
+from scanweld.io.raw import RawScan, to_bytes
+from scanweld.io.text_head import axis_name
+
+FIRST_ROWS = slice(0, 1000)
+"""Most that is not so is not so here already, and the rest need not be looked at."""
+INDEX_NOTE = "first column left out: it counts the points"
+
+_NAMES = {
+    "normals": (
+        ("nx", "ny", "nz"),
+        ("normalx", "normaly", "normalz"),
+        ("normals0", "normals1", "normals2"),
+    ),
+    "colors": (("r", "g", "b"), ("red", "green", "blue"), ("rf", "gf", "bf")),
+    "intensity": (("intensity",), ("reflectance",)),
+}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Columns:
+    """Numbers (from 0) of the columns that are read; empty where there are none."""
+
+    points: tuple[int, ...]
+    normals: tuple[int, ...] = ()
+    colors: tuple[int, ...] = ()
+    intensity: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def columns_by_name(path: Path, names: Sequence[str]) -> Columns:
+    """What names say, in small letters and without signs; those that say nothing are ignored.
+
+    Raises:
+        ReadError: If a coordinate is named twice.
+    """
+    axes = [axis_name(name) for name in names]
+    for axis in "xyz":
+        if axes.count(axis) > 1:
+            raise ReadError(f"{path}: two columns are named {axis}; leave one of them")
+    found = {role: _places(names, choices) for role, choices in _NAMES.items()}
+    points = tuple(axes.index(axis) for axis in "xyz")
+    used = {*points, *(place for places in found.values() for place in places)}
+    ignored = [name for k, name in enumerate(names) if k not in used and name]
+    notes = (f"columns ignored: {', '.join(ignored)}",) if ignored else ()
+    return Columns(points=points, notes=notes, **found)
+
+
+def is_known(name: str) -> bool:
+    """Whether a column of this name is read."""
+    return axis_name(name) in "xyz" or any(name in c for cs in _NAMES.values() for c in cs)
+
+
+def is_index(column: FloatArray) -> bool:
+    """Whether a column (N,) counts: 1, 2, 3 and so on, from whatever whole number."""
+    if len(column) < 3 or column[0] != np.rint(column[0]):
+        return False
+    return all((part[1:] == part[:-1] + 1).all() for part in (column[FIRST_ROWS], column))
+
+
+def scan_of_columns(table: FloatArray, columns: Columns) -> RawScan:
+    """The scan of a table (N, columns); colours on no known scale are left out with a note."""
+    colors, intensity = _taken(table, columns.colors), _taken(table, columns.intensity)
+    color_bytes = None if colors is None else to_bytes(colors, _integer_type(colors))
+    intensity_bytes = None if intensity is None else to_bytes(intensity, _integer_type(intensity))
+    notes = columns.notes
+    for what, values, read in (
+        ("colours", colors, color_bytes),
+        ("intensities", intensity, intensity_bytes),
+    ):
+        if values is not None and read is None:
+            notes += (f"{what} ignored: on no known scale (0 to 1, 0 to 255)",)
+    points = _taken(table, columns.points)
+    assert points is not None
+    return RawScan(
+        points=points,
+        normals=_taken(table, columns.normals),
+        colors=color_bytes,
+        intensity=None if intensity_bytes is None else intensity_bytes[:, 0],
+        notes=notes,
+    )
+
+
+def _places(names: Sequence[str], choices: Sequence[tuple[str, ...]]) -> tuple[int, ...]:
+    """Where the first of the choices stands that is there as a whole, each name once."""
+    for choice in choices:
+        if all(names.count(name) == 1 for name in choice):
+            return tuple(names.index(name) for name in choice)
+    return ()
+
+
+def _integer_type(values: FloatArray) -> str:
+    """The NumPy code of two bytes where whole numbers need them, for ``to_bytes``."""
+    return "u2" if (values == np.rint(values)).all() and 255 < values.max() <= 65535 else ""
+
+
+def _taken(table: FloatArray, places: tuple[int, ...]) -> FloatArray | None:
+    """Columns side by side (N, k), not copied where they stand so in the table."""
+    if not places:
+        return None
+    if places == tuple(range(places[0], places[0] + len(places))):
+        return table[:, places[0] : places[-1] + 1]
+    return table[:, list(places)]
