@@ -29,7 +29,7 @@ def run_twice(scans: Sequence[scanweld.RangeScan]) -> None:
     kept = Kept()
     result = scanweld.run(scans, cache=kept)
     print(f"first {result.verdict}: {len(result.poses)} scans are placed")
-    pair = max((p for p in result.pairs if p.accepted), key=lambda pair: pair.confidence)
+    pair = next(pair for pair in result.pairs if pair.accepted)
 
     fact = scanweld.Knowledge(apart=((pair.i, pair.j),))
     again = scanweld.run(scans, knowledge=fact, cache=kept)
