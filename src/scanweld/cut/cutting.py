@@ -17,7 +17,7 @@ from scanweld.geometry.scan import RangeScan
 
 logger = logging.getLogger(__name__)
 
-MOST_PAIRS = 0.5
+MOST_PAIRS = 0.8
 """Share of the pairs of frames that must show the same in most pixels: the camera stood still."""
 PATCH = 0.1
 """Size, as a share of the largest, of a patch of moved pixels that tells where the object is."""
@@ -150,8 +150,8 @@ def _checked(
         for count, part in ((inside, own), (outside, rest)):
             count[0] += int((mask & part).sum())
             count[1] += int(part.sum())
-    if sum(map(bool, shares)) < 2:
-        return "nothing moved that hangs together in two of the frames"
+    if 2 * sum(map(bool, shares)) < len(shares):
+        return "nothing moved that hangs together in most of the frames"
     if outside[0] * inside[1] > MAX_ELSEWHERE * inside[0] * outside[1]:
         return "what changes is spread over the frames: the camera did not quite stand still"
     if np.median([share for share in shares if share]) > MAX_KEPT:

@@ -21,7 +21,7 @@ MIN_PIXELS = 30
 RIVAL = 0.3
 """Size, as a share of the frame's largest moving piece, of one that may be the object instead."""
 NEAR_SIZES = 0.4
-"""Distance from a piece of the object, in sizes of its main piece, of what hangs together with it."""
+"""Distance from a piece of the object, in sizes of the main one, of what hangs together with it."""
 MAX_JUDGED = 2000
 """Points of a piece from which distances are measured."""
 

@@ -12,6 +12,8 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 SAME_SHARE_OF_DEPTH = 0.02
 """Depths that differ by less of themselves may be the same: sensors err alike in neighbouring
 pixels by up to this much, another way in each frame."""
+LEFT_SHARE_OF_DEPTH = 0.01
+"""What may be left of this when it is smoothed away, where the image ends or the object begins."""
 STILL = 0.6
 """Share of the pixels seen by two frames that must be the same if the camera stood still."""
 MAX_COMPARED = 24
@@ -58,7 +60,8 @@ class Standing:
         from scipy import ndimage
 
         even = self.even(depth)
-        is_front = even + SURE_SIGMAS * self.noise.at(even) < self.far
+        sure = SURE_SIGMAS * self.noise.at(even) + LEFT_SHARE_OF_DEPTH * even
+        is_front = even + sure < self.far
         return np.asarray(ndimage.binary_opening(is_front, np.ones((3, 3))), dtype=np.bool_)
 
 

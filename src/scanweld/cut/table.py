@@ -144,8 +144,9 @@ def _largest_plane(points: FloatArray, is_free: BoolArray, standing: Standing) -
             best, most = plane, count
     if best is None:
         return None
-    for _ in range(3):
-        held = tried[np.abs(best.height(tried)) <= plane_reach(best, tried, standing)]
+    for closer in (1.0, 0.5, 0.25):
+        reach = closer * plane_reach(best, tried, standing)
+        held = tried[np.abs(best.height(tried)) <= reach]
         if len(held) < 3:
             return None
         middle = held.mean(axis=0)
