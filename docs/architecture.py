@@ -23,7 +23,7 @@ LAYERS = (
     ("confidence", "knowledge"),
     ("graph", "published", "reconstruction"),
     ("pairs", "fusion", "evaluation"),
-    ("evidence", "heat", "refinement", "preparation", "work", "io"),
+    ("evidence", "heat", "refinement", "preparation", "cut", "work", "io"),
     ("contours",),
     ("geometry", "config"),
     ("errors", "choices", "compiled"),

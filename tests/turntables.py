@@ -153,7 +153,7 @@ def disturbed(
     near = ndimage.minimum_filter(np.where(seen, depth, np.inf), 3)
     is_jump = seen & (depth > near * 1.03)
     width = sensor.eaten * _smooth(depth.shape, 8.0, rng)
-    lost = ndimage.distance_transform_edt(~is_jump) < width
+    lost = np.asarray(ndimage.distance_transform_edt(~is_jump)) < width
     lost |= rng.random(depth.shape) < sensor.lost * _smooth(depth.shape, 3.0, rng) * 2
     if sensor.eaten:  # a dark part of the object
         lost |= is_object & (_smooth(depth.shape, 8.0, rng) > 0.97)

@@ -19,7 +19,7 @@ from scanweld.app.options import (
     Workers,
     takes,
 )
-from scanweld.choices import Method
+from scanweld.choices import Method, Shown
 
 if TYPE_CHECKING:
     from scanweld.knowledge.facts import Knowledge
@@ -95,6 +95,13 @@ class RunOptions:
         typer.Option("--no-cache", help="Neither keep finished work beside the output nor use it."),
     ] = False
     unit: UnitOption = None
+    shown: Annotated[
+        Shown | None,
+        typer.Option(
+            "--object",
+            help="Of whole depth frames: auto (the default), moving things only, or all.",
+        ),
+    ] = None
     method: Annotated[
         Method | None, typer.Option(help="robust (the default), or paper: as published.")
     ] = None
@@ -117,7 +124,13 @@ def run(options: RunOptions) -> None:
 
     output, memory = options.output, options.memory
     fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
-    settings = load_config(options.config, unit=options.unit, method=options.method, fusion=fusion)
+    settings = load_config(
+        options.config,
+        object=options.shown,
+        unit=options.unit,
+        method=options.method,
+        fusion=fusion,
+    )
     known = options.facts.known()
     try:
         with options.show.reporting() as progress:

@@ -2,12 +2,13 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from scanweld.choices import Shown
 from scanweld.cut.frames import Frames, frames_of
+from scanweld.cut.masks import with_only
 from scanweld.cut.pieces import moving_pieces, objects_of
 from scanweld.cut.standing import Standing, share_of_still_pairs, standing
 from scanweld.cut.table import above, supporting_planes
@@ -77,17 +78,6 @@ def cut_out(scans: Sequence[RangeScan], shown: Shown) -> CutSet:
         if scan.name not in empty
     ]
     return CutSet(scans=tuple(cut), kept=found, empty=empty)
-
-
-def with_only(scan: RangeScan, kept: BoolArray) -> RangeScan:
-    """A scan with the points of some cells (H, W) of its grid alone, and a note that says so."""
-    if scan.grid is None:
-        raise ValueError(f"{scan.name}: has no grid")
-    is_kept = np.zeros(len(scan.points), dtype=bool)
-    is_kept[scan.grid[kept & (scan.grid >= 0)]] = True
-    share = is_kept.sum() / max(int((scan.grid >= 0).sum()), 1)
-    note = f"cut: table and background, {share:.1%} of the pixels kept"
-    return replace(scan.only(is_kept), notes=(*scan.notes, note))
 
 
 def _kept(scans: Sequence[RangeScan]) -> dict[str, BoolArray] | str:

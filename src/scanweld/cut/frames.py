@@ -39,16 +39,22 @@ def frames_of(scans: Sequence[RangeScan]) -> Frames | str:
     Args:
         scans: At least one; those without points are left out.
     """
-    seen = sorted((scan for scan in scans if len(scan.points)), key=RangeScan.content_hash)
-    cameras = {scan.camera for scan in seen}
-    camera = None if len(cameras) != 1 else cameras.pop()
+    seen = [scan for scan in scans if len(scan.points)]
     if len(seen) < 2:
         return "fewer than two frames saw anything"
-    if camera is None or camera.model is not CameraModel.PINHOLE:
+    camera = camera_of(seen)
+    if camera is None:
         return "the scans are no depth images of one pinhole camera"
     if not all(_fits(scan, camera) for scan in seen):
         return "the points of the scans do not lie where their camera sees them"
-    return Frames(scans=tuple(seen), camera=camera)
+    return Frames(scans=tuple(sorted(seen, key=RangeScan.content_hash)), camera=camera)
+
+
+def camera_of(scans: Sequence[RangeScan]) -> Camera | None:
+    """The pinhole camera that all scans that saw anything have alike, if there is one."""
+    cameras = {scan.camera for scan in scans if len(scan.points)}
+    camera = cameras.pop() if len(cameras) == 1 else None
+    return camera if camera is not None and camera.model is CameraModel.PINHOLE else None
 
 
 def depth_image(scan: RangeScan) -> FloatArray:

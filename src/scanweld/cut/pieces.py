@@ -98,7 +98,7 @@ def objects_of(frames: Sequence[Pieces]) -> list[IntArray]:
 def _object_of(frame: Pieces, middle: FloatArray) -> IntArray:
     if not frame.masks:
         return np.empty(0, dtype=np.int64)
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     rivals = [k for k, mask in enumerate(frame.masks) if len(mask) >= RIVAL * len(frame.masks[0])]
     off = [np.linalg.norm(np.median(frame.points[k], axis=0) - middle) for k in rivals]
@@ -106,7 +106,7 @@ def _object_of(frame: Pieces, middle: FloatArray) -> IntArray:
     size = float(np.linalg.norm(np.ptp(frame.points[main], axis=0)))
     kept, rest = [main], [k for k in range(len(frame.masks)) if k != main]
     for k in kept:  # grows as it is read
-        tree = cKDTree(_thin(frame.points[k]))
+        tree = KDTree(_thin(frame.points[k]))
         near = [m for m in rest if tree.query(_thin(frame.points[m]))[0].min() <= NEAR_SIZES * size]
         kept += near
         rest = [m for m in rest if m not in near]

@@ -34,7 +34,7 @@ def smooth_field(values: FloatArray, is_used: BoolArray) -> FloatArray:
         sums += faint * ndimage.gaussian_filter(total, sigma, mode="constant")
         weights += faint * ndimage.gaussian_filter(weight, sigma, mode="constant")
     field = ndimage.zoom(sums / weights, BLOCK, order=1, mode="nearest", grid_mode=True)
-    return field[: values.shape[0], : values.shape[1]]
+    return np.asarray(field, dtype=np.float64)[: values.shape[0], : values.shape[1]]
 
 
 def _blocks(image: FloatArray) -> FloatArray:
