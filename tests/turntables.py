@@ -86,6 +86,7 @@ def turntable(
     camera: Camera = CAMERA,
     room: TriangleMesh | None = None,
     camera_turns_deg: float = 0.0,
+    size: float = SIZE,
 ) -> Shots:
     """Render an object on a table, before a wall, at several turns of the object.
 
@@ -96,11 +97,12 @@ def turntable(
         camera: Its intrinsics.
         room: What stands still; the table, a wall and a box if not given.
         camera_turns_deg: How far the camera goes around from one frame to the next.
+        size: Largest extent of the object.
     """
     sensor, room = sensor or Sensor(), room or standing_room()
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     middle = np.append((low + high)[:2] / 2, low[2])
-    body = (mesh.vertices - middle) * (SIZE / (high - low).max())
+    body = (mesh.vertices - middle) * (size / (high - low).max())
     scans, masks = [], []
     for k, turn in enumerate(turns_deg):
         around = rotation_exp(np.radians([0.0, 0.0, turn]))
