@@ -62,8 +62,9 @@ def depth_image(scan: RangeScan) -> FloatArray:
     if scan.grid is None:
         raise ValueError(f"{scan.name}: has no grid")
     sensor_from_scan = (scan.scan_from_sensor or Pose.identity()).inverse()
-    depth = np.append(sensor_from_scan.apply(scan.points)[:, 2], np.nan)
-    return depth[scan.grid]
+    x, y, z = sensor_from_scan.rotation[2]
+    depth = x * scan.points[:, 0] + y * scan.points[:, 1] + z * scan.points[:, 2]
+    return np.append(depth + sensor_from_scan.translation[2], np.nan)[scan.grid]
 
 
 def _fits(scan: RangeScan, camera: Camera) -> bool:
