@@ -9,7 +9,7 @@ import numpy as np
 from scanweld.choices import Shown
 from scanweld.cut.frames import Frames, frames_of
 from scanweld.cut.masks import with_only
-from scanweld.cut.pieces import moving_pieces, objects_of
+from scanweld.cut.pieces import RIVAL, moving_pieces, objects_of
 from scanweld.cut.standing import Standing, share_of_still_pairs, standing
 from scanweld.cut.table import above, supporting_planes
 from scanweld.errors import InputError
@@ -20,8 +20,6 @@ logger = logging.getLogger(__name__)
 
 MOST_PAIRS = 0.8
 """Share of the pairs of frames that must show the same in most pixels: the camera stood still."""
-PATCH = 0.1
-"""Size, as a share of the largest, of a patch of moved pixels that tells where the object is."""
 MAX_ELSEWHERE = 0.1
 """Share of the pixels off the object that seem to have moved, over that of the object's, above
 which it is the camera that moved."""
@@ -87,7 +85,10 @@ def _kept(scans: Sequence[RangeScan]) -> dict[str, BoolArray] | str:
         return frames
     still = share_of_still_pairs(frames)
     if still < MOST_PAIRS:
-        return f"the camera moved: only {still:.0%} of the pairs of frames show the same around it"
+        return (
+            f"the camera moved, or the object fills the frames: {still:.0%} of the pairs of frames "
+            "show the same in most pixels"
+        )
     background = standing(frames)
     moved = [background.revealed(frames.depth(k)) for k in range(len(frames.scans))]
     points = _points_of_patches(frames, moved)
@@ -106,7 +107,7 @@ def _points_of_patches(frames: Frames, moved: Sequence[BoolArray]) -> FloatArray
         ndimage.label(mask, np.ones((3, 3)), output=patch)
         size = np.bincount(patch.ravel())
         size[0] = 0
-        large = mask & (size >= PATCH * size.max())[patch]
+        large = mask & (size >= RIVAL * size.max())[patch]
         found.append(frames.camera.unproject_image(frames.depth(k))[large])
     points = np.concatenate(found)
     return points[:: max(1, len(points) // MAX_POINTS)]

@@ -12,8 +12,6 @@ from scanweld.geometry.scan import RangeScan
 
 MAX_OFF_PIXELS = 0.6
 """How far from its cell a point may lie in the camera's image: half a cell, and rounding."""
-NUM_CHECKED = 5000
-"""Points of a scan that are checked for it, at most."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -72,8 +70,6 @@ def _fits(scan: RangeScan, camera: Camera) -> bool:
     if scan.grid is None or scan.grid.shape != (camera.height, camera.width):
         return False
     rows, columns = np.nonzero(scan.grid >= 0)
-    stride = max(1, len(rows) // NUM_CHECKED)
-    rows, columns = rows[::stride], columns[::stride]
     sensor_from_scan = (scan.scan_from_sensor or Pose.identity()).inverse()
     pixels, _ = camera.project(sensor_from_scan.apply(scan.points[scan.grid[rows, columns]]))
     off = np.abs(pixels - np.stack([columns, rows], axis=1))

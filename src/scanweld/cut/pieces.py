@@ -18,12 +18,10 @@ MIN_MOVED = 0.05
 """Least share of a piece that must be seen to have moved."""
 MIN_PIXELS = 30
 """Least pixels of a piece of the object."""
-RIVAL = 0.3
-"""Size, as a share of the frame's largest moving piece, of one that may be the object instead."""
+RIVAL = 0.1
+"""Size, as a share of the largest, of what may be the object instead: pieces, and moved patches."""
 NEAR_SIZES = 0.4
 """Distance from a piece of the object, in sizes of the main one, of what hangs together with it."""
-MAX_JUDGED = 2000
-"""Points of a piece from which distances are measured."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -106,12 +104,8 @@ def _object_of(frame: Pieces, middle: FloatArray) -> IntArray:
     size = float(np.linalg.norm(np.ptp(frame.points[main], axis=0)))
     kept, rest = [main], [k for k in range(len(frame.masks)) if k != main]
     for k in kept:  # grows as it is read
-        tree = KDTree(_thin(frame.points[k]))
-        near = [m for m in rest if tree.query(_thin(frame.points[m]))[0].min() <= NEAR_SIZES * size]
+        tree = KDTree(frame.points[k])
+        near = [m for m in rest if tree.query(frame.points[m])[0].min() <= NEAR_SIZES * size]
         kept += near
         rest = [m for m in rest if m not in near]
     return np.sort(np.concatenate([frame.masks[k] for k in kept]))
-
-
-def _thin(points: FloatArray) -> FloatArray:
-    return points[:: max(1, len(points) // MAX_JUDGED)]

@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from scanweld.cut.smoothing import smooth_field, trimmed_rms
-from scanweld.cut.standing import SURE_SIGMAS, Standing
+from scanweld.cut.smoothing import LEAST_NOISE, smooth_field, trimmed_rms
+from scanweld.cut.standing import LEFT_SHARE_OF_DEPTH, SURE_SIGMAS, Standing
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.camera import Camera
 
-BEND = 0.01
-"""Depth error that bends a plane smoothly, as a share of the depth."""
-NUM_SEEDS = 24
-"""Places across the image at each of which a plane is tried."""
+NUM_SEEDS, NUM_TRIED = 24, 3000
+"""Triangles across the image each of which gives a plane, and points that these are tried on."""
 MIN_SHARE = 0.01
 """Least share of the settled pixels that lie in a plane."""
 MIN_TABLE_SHARE = 0.05
@@ -22,8 +21,6 @@ MAX_PLANES = 5
 """Planes that are looked at, at most: a table, a turntable's disc, a sheet of paper, walls."""
 PARALLEL = 0.985
 """Cosine of the angle, 10 degrees, up to which other planes are parallel to the table."""
-MAX_BELOW = 0.02
-"""Most of what moves that lies below the plane that it stands on, as a share."""
 MAX_LIFT = 0.5
 """Height of the lowest parts that move above the plane, as a share of that of the highest, up to
 which the object stands on it: its foot may look the same from all sides, and then not move."""
@@ -32,8 +29,8 @@ NUM_ROUNDS = 3
 TABLE_SIGMAS = 3.0
 """Height above the table, in standard deviations of its own pixels, from which a pixel is not of
 it: single pixels beyond make no piece."""
-LOWEST, HIGHEST = 0.02, 0.98
-"""Quantiles that stand for them."""
+LOWEST = 0.02
+"""Quantile that stands for the lowest, and share of what moved that may lie below the plane."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -102,11 +99,12 @@ def above(
     for plane in planes:
         height = plane.height(points)
         sigma = _sigma(plane, points, standing)
+        least = LEAST_NOISE * np.abs(points @ plane.normal)
         flat = ~moved & (np.abs(height) <= plane_reach(plane, points, standing))
         is_used, over = flat, height / sigma
         for _ in range(NUM_ROUNDS if flat.any() else 0):
-            over = (height - smooth_field(height, is_used)) / sigma
-            over /= trimmed_rms(over[is_used])
+            off = height - smooth_field(height, is_used)
+            over = off / np.maximum(trimmed_rms((off / sigma)[is_used]) * sigma, least)
             is_used = flat & (np.abs(over) <= TABLE_SIGMAS)
         is_above &= over > TABLE_SIGMAS
     return is_above
@@ -114,7 +112,7 @@ def above(
 
 def plane_reach(plane: Plane, points: FloatArray, standing: Standing) -> FloatArray:
     """Height (...) up to which points (..., 3) may be the plane's, bent and noisy."""
-    bend = BEND * np.abs(points @ plane.normal)
+    bend = LEFT_SHARE_OF_DEPTH * np.abs(points @ plane.normal)
     return 2 * bend + SURE_SIGMAS * _sigma(plane, points, standing)
 
 
@@ -126,16 +124,11 @@ def _sigma(plane: Plane, points: FloatArray, standing: Standing) -> FloatArray:
 
 def _largest_plane(points: FloatArray, is_free: BoolArray, standing: Standing) -> Plane | None:
     """The plane that holds most of some pixels (H, W) of points (H, W, 3)."""
-    step = max(2, points.shape[1] // NUM_SEEDS)
-    corner = np.s_[: -step : step // 2, : -step : step // 2]
-    right, down = points[:-step, step:][:: step // 2, :: step // 2], points[step:, :-step]
-    down = down[:: step // 2, :: step // 2]
-    fits = is_free[corner] & is_free[:-step, step:][:: step // 2, :: step // 2]
-    fits &= is_free[step:, :-step][:: step // 2, :: step // 2]
+    fits = np.logical_and.reduce(_corners(is_free))
     tried = points[is_free]
-    tried = tried[:: max(1, len(tried) // 3000)]
+    tried = tried[:: max(1, len(tried) // NUM_TRIED)]
     best, most = None, 0
-    for a, b, c in zip(points[corner][fits], right[fits], down[fits], strict=True):
+    for a, b, c in zip(*(corner[fits] for corner in _corners(points)), strict=True):
         plane = _plane_through(np.cross(b - a, c - a), a)
         if plane is None:
             continue
@@ -155,6 +148,14 @@ def _largest_plane(points: FloatArray, is_free: BoolArray, standing: Standing) -
     return best
 
 
+def _corners(image: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
+    """An image's values at the right-angled corners of triangles all over it."""
+    step = max(2, image.shape[1] // NUM_SEEDS)
+    thin = np.s_[:: step // 2, :: step // 2]
+    parts = image[:-step, :-step], image[:-step, step:], image[step:, :-step]
+    return [part[thin] for part in parts]
+
+
 def _plane_through(normal: FloatArray, point: FloatArray) -> Plane | None:
     length = float(np.linalg.norm(normal))
     if not length > 0:
@@ -172,7 +173,7 @@ def _lift(plane: Plane, moving: FloatArray, standing: Standing) -> float:
     It is infinite where something moved below the plane.
     """
     height, reach = plane.height(moving), plane_reach(plane, moving, standing)
-    low, high = np.quantile(height, [LOWEST, HIGHEST])
-    if high <= 0 or (height < -reach).mean() > MAX_BELOW:
+    low, high = np.quantile(height, [LOWEST, 1 - LOWEST])
+    if high <= 0 or (height < -reach).mean() > LOWEST:
         return np.inf
     return float(low / high)

@@ -14,8 +14,8 @@ from scanweld.reconstruction import ScanReport
 
 WIDTH = 240
 """Pixels across a picture, at most."""
-LIGHT, DARK = 235.0, 60.0
-"""Grey of what is near and of what is far."""
+GREYS = (235.0, 60.0)
+"""Of what is near and of what is far."""
 KEPT = (0.35, 0.8, 0.55)
 """How the grey of pixels that were kept is tinted."""
 NOTHING = (24, 28, 40)
@@ -47,6 +47,6 @@ def _picture(depth: FloatArray, kept: BoolArray) -> ByteArray:
     near, far = np.quantile(depth[has], [0.02, 0.98]) if has.any() else (0.0, 1.0)
     with np.errstate(invalid="ignore"):
         share = np.clip((depth - near) / max(far - near, np.finfo(float).tiny), 0.0, 1.0)
-    grey = np.where(has, LIGHT + (DARK - LIGHT) * share, 0.0)[..., None]
+    grey = np.where(has, GREYS[0] + (GREYS[1] - GREYS[0]) * share, 0.0)[..., None]
     color = np.where(kept[..., None], grey * KEPT, grey)
     return np.rint(np.where(has[..., None], color, NOTHING)).astype(np.uint8)
