@@ -24,7 +24,7 @@ LAYERS = (
     ("graph", "published", "reconstruction"),
     ("sensor",),
     ("pairs", "fusion", "evaluation"),
-    ("evidence", "heat", "refinement", "preparation", "work", "io"),
+    ("evidence", "heat", "refinement", "preparation", "cut", "work", "io"),
     ("contours",),
     ("geometry", "config"),
     ("errors", "choices", "compiled"),

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from scanweld.choices import Component, Holes, Method, Unit
+from scanweld.choices import Component, Holes, Method, Shown, Unit
 from scanweld.errors import ConfigError
 
 logger = logging.getLogger(__name__)
@@ -247,6 +247,9 @@ class Config(Section):
     method: Method = "robust"
     """How poses are found: by an exhaustive search and joint refinement ("robust"), or as
     published, by PA-HKS matches with ICP and MM-ICC ("paper"). The same rules judge both."""
+    object: Shown = "auto"
+    """What of whole depth frames is the object: what moves before a standing camera, where the
+    frames show that ("auto"), or else nothing is done ("moving"); or all that is seen ("all")."""
     unit: Unit | None = None
     """Unit of the scans' coordinates; unknown if not given. It is written to the report with the
     settings; nothing else depends on it."""

@@ -77,6 +77,8 @@ class ScanReport:
             unplaced.
         rms: Point-to-plane residual after the joint refinement, in the scans' unit.
         is_without_support: Whether the plane that the object stands on was left out.
+        kept: Cells of its grid that were kept when the object was cut out, as ``cut.mask_of`` reads
+            them; None if nothing was cut.
         confidence: Probability that it is placed rightly beside the others of its component; None
             if unplaced.
         grounds: What the confidence rests on, see docs/report.md.
@@ -101,6 +103,7 @@ class ScanReport:
     overlap: float | None = None
     rms: float | None = None
     is_without_support: bool = False
+    kept: str | None = None
     confidence: float | None = None
     grounds: Mapping[str, float] = field(default_factory=dict)
     rotation_bound_deg: float | None = None

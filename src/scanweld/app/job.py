@@ -156,7 +156,8 @@ def report_job(folder: Path | str, inputs: Sequence[Path | str] = ()) -> Path:
     """
     model = open_model(Path(folder))
     try:
-        files = model.scan_files(model.poses.poses, inputs)
+        cut = [name for name, scan in model.report.scans.items() if scan.kept is not None]
+        files = model.scan_files(dict.fromkeys([*model.poses.poses, *cut]), inputs)
     except InputError as error:
         if inputs:
             raise

@@ -22,7 +22,7 @@ from scanweld.app.options import (
     takes,
     without_collecting,
 )
-from scanweld.choices import Method
+from scanweld.choices import Method, Shown
 from scanweld.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -94,6 +94,21 @@ class RunOptions:
     ] = None
     no_cache: NoCacheOption = False
     unit: UnitOption = None
+    shown: Annotated[
+        Shown | None,
+        typer.Option(
+            "--object",
+            help="Of whole depth frames: auto (the default), moving things only, or all.",
+        ),
+    ] = None
+    min_accuracy: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="PERCENT",
+            help="Doubt scans that may be off by more, in percent of the diameter.",
+        ),
+    ] = None
     method: Annotated[
         Method | None, typer.Option(help="robust (the default), or paper: as published.")
     ] = None
@@ -119,7 +134,14 @@ def run(options: RunOptions) -> None:
 
     output, memory = options.output, options.memory
     fusion = {**options.surface.settings(), "with_doubtful": options.with_doubtful or None}
-    settings = load_config(options.config, unit=options.unit, method=options.method, fusion=fusion)
+    settings = load_config(
+        options.config,
+        object=options.shown,
+        unit=options.unit,
+        method=options.method,
+        fusion=fusion,
+        confidence={"min_accuracy_percent": options.min_accuracy},
+    )
     known = options.facts.known()
     processes = options.workers if memory is None else 1  # others would take memory too
     try:

@@ -8,6 +8,7 @@ from pathlib import Path
 from scanweld.app.frame_files import read_frames
 from scanweld.app.model_files import Files, Graph, Report, read_entries
 from scanweld.config import Unit, load_config
+from scanweld.cut import mask_of, with_only
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
@@ -122,7 +123,7 @@ class ModelFolder:
         return found, missing
 
     def read_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
-        """Scans as the model's maker took them: thinned where it had to save memory.
+        """Scans as the model's maker took them: thinned where it had to save memory, not yet cut.
 
         Args:
             files: As ``scan_files`` finds them, by the scans' names.
@@ -134,7 +135,7 @@ class ModelFolder:
         return {name: self._as_taken(self._read(name, path)) for name, path in files.items()}
 
     def read_whole_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
-        """The same with all of their points.
+        """The same with all of their points, but for what was cut off.
 
         Raises:
             InputError: If one of them is not what the model was made of.
@@ -143,7 +144,29 @@ class ModelFolder:
         scans = {name: self._read(name, path) for name, path in files.items()}
         for scan in scans.values():
             self._as_taken(scan)
-        return scans
+        return {name: self.cut(scan) for name, scan in scans.items()}
+
+    def cut(self, scan: RangeScan) -> RangeScan:
+        """A scan without what the run cut off.
+
+        Raises:
+            InputError: If it is not the scan that was cut.
+            ReadError: If the report is broken.
+        """
+        told = self._files.scans.get(scan.name)
+        if told is None or told.kept is None:
+            return scan
+        try:
+            kept = mask_of(told.kept)
+        except ValueError as error:
+            path = self.path / "report.json"
+            raise ReadError(
+                f"{path}: scans.{scan.name}.kept: {error}; run scanweld again"
+            ) from error
+        try:
+            return with_only(scan, kept)
+        except ValueError as error:
+            raise InputError(f"{error}; give the same files") from error
 
     def _read(self, name: str, path: Path) -> RangeScan:
         settings = self._frames.get(name)
@@ -153,7 +176,7 @@ class ModelFolder:
         """A scan as the model's maker took it, after making sure that it is the same one."""
         most, told = self._files.max_points, self._files.scans.get(scan.name)
         taken = scan if most is None else thinned(scan, most)
-        if told is not None and told.content_hash not in (None, taken.content_hash()):
+        if told is not None and told.content_hash not in (None, self.cut(taken).content_hash()):
             raise InputError(
                 f"{printed(scan.name)}: is not the scan that {self.path} was made of; give the "
                 "same files"

@@ -9,6 +9,7 @@ from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline.conclude import conclude
 from scanweld.pipeline.intake import Intake, take_in
 from scanweld.pipeline.method import Scene
+from scanweld.pipeline.object_cut import cut_scans, with_kept
 from scanweld.pipeline.published import published_method
 from scanweld.pipeline.registration import common_axis, register_pairs
 from scanweld.pipeline.robust import robust_method
@@ -60,7 +61,8 @@ def run(
         not be placed are named in it with the reason.
 
     Raises:
-        InputError: If fewer than two scans are usable.
+        InputError: If fewer than two scans are usable, or the settings ask for what moves and
+            nothing does.
         KnowledgeError: If what is known is about scans that are not there.
     """
     config = config or Config()
@@ -72,8 +74,10 @@ def run(
         runner=runner,
     )
     with single_threaded_algebra():
-        intake = take_in(scans, unreadable or {}, knowledge or Knowledge(), config, stages)
-        return reconstruct(intake, config, stages)
+        cut = cut_scans(scans, config, stages)
+        refused = {**(unreadable or {}), **cut.empty}
+        intake = take_in(cut.scans, refused, knowledge or Knowledge(), config, stages)
+        return with_kept(reconstruct(intake, config, stages), cut)
 
 
 def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstruction:

@@ -16,6 +16,7 @@ from scanweld.app.html_report.colors import (
     scan_colors,
 )
 from scanweld.app.html_report.contour_overlays import Overlay, contour_overlays
+from scanweld.app.html_report.cut_pictures import cut_pictures
 from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
 from scanweld.app.html_report.orientation import as_seen_from
@@ -33,6 +34,7 @@ from scanweld.app.model_files import PairEntry
 from scanweld.app.model_folder import ModelFolder
 from scanweld.app.summary import verdict_sentence
 from scanweld.config import Config
+from scanweld.geometry.scan import RangeScan
 from scanweld.geometry.shading import Side
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanVerdict
@@ -60,13 +62,19 @@ class ScanLook:
     color: str
 
 
-def report_page(model: ModelFolder, sources: Sources | None, config: Config) -> str:
+def report_page(
+    model: ModelFolder,
+    sources: Sources | None,
+    config: Config,
+    scans: Mapping[str, RangeScan],
+) -> str:
     """The whole page as HTML.
 
     Args:
         model: What a run wrote.
         sources: The scans; None leaves out what only they can tell.
         config: Settings of the run.
+        scans: By name, as they were read, for pictures of what was cut off them.
     """
     looks = scan_looks(list(model.report.scans))
     sizes = [scan.diameter for scan in model.report.scans.values() if scan.diameter]
@@ -100,6 +108,7 @@ def report_page(model: ModelFolder, sources: Sources | None, config: Config) -> 
         **_outcome(model),
         **_graph(model, looks),
         **_surface(model, sources, looks),
+        cuts=cut_pictures(model.report.scans, scans),
         overlays=_overlays(model, sources, config),
         stages=model.report.stages,
         settings=model.report.settings,

@@ -31,7 +31,7 @@ class Sources:
         self._entries = model.report.scans
         self._fused = model.fused_scans
         self._config = config
-        self._scans = scans
+        self._scans = {name: model.cut(scan) for name, scan in scans.items()}
         self._prepared = {} if model.result is None else dict(model.result.prepared)
 
     def points_of_model(self) -> dict[str, FloatArray]:

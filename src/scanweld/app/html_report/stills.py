@@ -43,10 +43,10 @@ def stills(
     sides: Mapping[str, Side], names: Sequence[str], colors: ByteArray | None, what: str
 ) -> list[Still]:
     """Pictures from some of the sides, in colours (V, 3)."""
-    return [_still(sides[name], colors, f"{what} {name}") for name in names]
+    return [still_of(sides[name].cutout(colors), f"{what} {name}") for name in names]
 
 
-def _still(side: Side, colors: ByteArray | None, alt: str) -> Still:
-    picture = side.cutout(colors)
+def still_of(picture: ByteArray, alt: str) -> Still:
+    """A picture (H, W, 3 or 4) with the words for those who cannot see it."""
     address = "data:image/png;base64," + base64.b64encode(png_bytes(picture)).decode("ascii")
     return Still(address=address, alt=alt, width=picture.shape[1], height=picture.shape[0])

@@ -47,7 +47,7 @@ def write_html_report(
     if scans is not None and model.poses.poses:
         sources = Sources(model, scans, config.prepare)
     with single_threaded_algebra():
-        page = report_page(model, sources, config)
+        page = report_page(model, sources, config, scans or {})
     path = folder / "report.html"
     write_whole(path, page.encode("utf-8"))
     logger.debug("%s: %d bytes", path, len(page))

@@ -1,0 +1,52 @@
+"""What was cut off each scan: its depth in grey, with the pixels that were kept in colour."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from scanweld.app.html_report.stills import Still, still_of
+from scanweld.cut import mask_of
+from scanweld.cut.frames import depth_image
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
+from scanweld.geometry.scan import RangeScan
+from scanweld.io import natural_key
+from scanweld.reconstruction import ScanReport
+
+WIDTH = 240
+"""Pixels across a picture, at most."""
+GREYS = (235.0, 60.0)
+"""Of what is near and of what is far."""
+KEPT = (0.35, 0.8, 0.55)
+"""How the grey of pixels that were kept is tinted."""
+NOTHING = (24, 28, 40)
+"""Colour of pixels that saw nothing."""
+
+
+def cut_pictures(
+    reports: Mapping[str, ScanReport], scans: Mapping[str, RangeScan]
+) -> dict[str, Still]:
+    """A picture of each scan that something was cut off, by name.
+
+    Args:
+        reports: What became of the scans.
+        scans: As they were read; those that are missing have no picture.
+    """
+    return {
+        name: still_of(
+            _picture(depth_image(scans[name]), mask_of(kept)), f"What was kept of {name}"
+        )
+        for name in sorted(reports, key=natural_key)
+        if (kept := reports[name].kept) is not None and name in scans
+    }
+
+
+def _picture(depth: FloatArray, kept: BoolArray) -> ByteArray:
+    step = -(-depth.shape[1] // WIDTH)
+    depth, kept = depth[::step, ::step], kept[::step, ::step]
+    has = np.isfinite(depth)
+    near, far = np.quantile(depth[has], [0.02, 0.98]) if has.any() else (0.0, 1.0)
+    with np.errstate(invalid="ignore"):
+        share = np.clip((depth - near) / max(far - near, np.finfo(float).tiny), 0.0, 1.0)
+    grey = np.where(has, GREYS[0] + (GREYS[1] - GREYS[0]) * share, 0.0)[..., None]
+    color = np.where(kept[..., None], grey * KEPT, grey)
+    return np.rint(np.where(has[..., None], color, NOTHING)).astype(np.uint8)
