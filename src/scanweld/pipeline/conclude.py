@@ -12,7 +12,6 @@ from scanweld.evidence.visibility import two_way_evidence
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.graph.reasons import why_open
@@ -54,7 +53,7 @@ def conclude(
     for k, scan in enumerate(prepared):
         report = _scan_report(k, scene, graph)
         report = _with_confidence(report, confidence.scans.get(k))
-        scans[scan.name] = _with_bound(report, confidence.bounds.get(k))
+        scans[scan.name] = _with_bound(report, k, confidence)
     verdict, reasons = _verdict(graph, scans, mesh, facts, config)
     return Reconstruction(
         poses=_poses(prepared, graph),
@@ -92,10 +91,21 @@ def _with_confidence(report: Report, assessed: Assessed | None) -> Report:
     return replace(report, confidence=assessed.confidence, grounds=assessed.grounds)
 
 
-def _with_bound(report: ScanReport, bound: PoseTolerance | None) -> ScanReport:
-    if bound is None:
+def _with_bound(report: ScanReport, k: int, confidence: Confidence) -> ScanReport:
+    bound, told = confidence.bounds.get(k), confidence.exactness.get(k)
+    if bound is None or told is None:
         return report
-    return replace(report, rotation_bound_deg=bound.angle_deg, translation_bound=bound.shift)
+    return replace(
+        report,
+        rotation_bound_deg=bound.angle_deg,
+        translation_bound=bound.shift,
+        exactness={
+            "deviation_deg": told.deviation.angle_deg,
+            "deviation": told.deviation.shift,
+            "cycle_deg": told.cycle.angle_deg,
+            "cycle": told.cycle.shift,
+        },
+    )
 
 
 def _others(poses: Mapping[int, Pose], reference: int) -> list[int]:
