@@ -356,7 +356,7 @@ def test_files_of_different_runs_are_refused(tmp_path: Path):
 def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     scene = small_scene()
     scans = write_scans(tmp_path / "scans", scene.scans)
-    read, _ = job.read_all(job.collect([scans]))
+    read, _ = job.read_all(job.collect_named([scans]))
     result = good_result(dataclasses.replace(scene, scans=tuple(read)))
     folder = written(tmp_path / "model", result)
     assert command("report", folder, "--scans", scans) == 0
