@@ -75,7 +75,9 @@ def _exact_to(result: Reconstruction) -> list[str]:
     if result.sensor is None or not turns or not shifts:
         return []
     share = max(shifts) / result.sensor.diameter
-    return [f"  good scans are exact to {max(turns):.2g} deg and {share:.2%} of the diameter (95 %)"]
+    return [
+        f"  good scans are exact to {max(turns):.2g} deg and {share:.2%} of the diameter (95 %)"
+    ]
 
 
 def _in_order(reasons: dict[str, str]) -> list[tuple[str, str]]:

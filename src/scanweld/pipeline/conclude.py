@@ -14,6 +14,7 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
+from scanweld.graph.doubts import DoubtCode
 from scanweld.graph.reasons import why_open
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.pairs.result import Alternative, PairResult, weights_of
@@ -268,6 +269,18 @@ def _overlap_share(evidence: Evidence) -> float:
     return evidence.agree + evidence.contradict
 
 
+def _bodies(graph: ViewGraph) -> list[str]:
+    """That not all of what the scans show moves as one body, where that is in doubt."""
+    doubts = [doubt for some in graph.doubts.values() for doubt in some]
+    told = sorted({doubt.text for doubt in doubts if doubt.code is DoubtCode.CAMERA_STOOD})
+    if any(doubt.code is DoubtCode.MOVED_PART for doubt in doubts):
+        told.append(
+            "parts of scans lie where other sensors saw through: a part of the object moved by "
+            "itself, or a pose is wrong"
+        )
+    return told
+
+
 def _verdict(
     graph: ViewGraph,
     scans: Mapping[str, ScanReport],
@@ -292,6 +305,7 @@ def _verdict(
     if by_verdict[ScanVerdict.DOUBTFUL]:
         told = "" if config.fusion.with_doubtful else " (placed, but left out of the model)"
         reasons.append(f"doubtful: {', '.join(by_verdict[ScanVerdict.DOUBTFUL])}{told}")
+    reasons += _bodies(graph)
     if by_verdict[ScanVerdict.UNPLACED]:
         reasons.append(f"not placed: {', '.join(by_verdict[ScanVerdict.UNPLACED])}")
     if len(graph.components) > 1:
