@@ -152,7 +152,7 @@ def _two_bodies(outcomes: Sequence[Outcome]) -> Floor:
 
 
 def _bounded(outcomes: Sequence[Outcome]) -> list[Floor]:
-    """Whether errors keep within the bounds that are stated, of right scans with an error at all."""
+    """Whether errors keep within the bounds that are stated, of right scans that have any."""
     held: dict[str, list[bool]] = {}
     for outcome in outcomes:
         for scan in outcome.scans:
