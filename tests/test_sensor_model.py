@@ -36,7 +36,7 @@ def learnt(pair: PreparedPair, *results: PairResult) -> SensorModel:
 def with_depth(field: ScanField, change: Callable[[FloatArray], FloatArray]) -> ScanField:
     """The scan with other depths: its pixels, samples and surface move along the rays."""
     raster = field.raster.copy()
-    raster[..., RASTER_DEPTH] += change(raster[..., RASTER_DEPTH])
+    raster[..., RASTER_DEPTH] += change(raster[..., RASTER_DEPTH].astype(np.float64))
     return replace(field, raster=raster)
 
 
