@@ -19,6 +19,8 @@ from scanweld.config import Config
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
+from scanweld.sensor.accuracy import pose_deviations
+from scanweld.sensor.model import SensorModel
 
 MAX_UNDECIDED_CONFIDENCE = 0.49
 """Most confidence in a pose that what was seen leaves open: it slides, another fits as well, or too
@@ -52,6 +54,21 @@ class Confidence:
     deviations: Mapping[int, PoseTolerance] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Joints:
+    """What is known of placed scans beside their pairs.
+
+    Attributes:
+        homes: The component that each is in, looked at as a whole.
+        deviations: Standard deviations of their poses.
+        sensor: What the set says of its sensor.
+    """
+
+    homes: Mapping[int, JointEvidence]
+    deviations: Mapping[int, PoseTolerance]
+    sensor: SensorModel
+
+
 def assess(
     graph: ViewGraph, diagnostics: PairDiagnostics, calibration: Calibration, config: Config
 ) -> Confidence:
@@ -63,6 +80,8 @@ def assess(
         calibration: The models.
         config: Settings: what leaves a pose open.
     """
+    sensor, deviations = diagnostics.sensor, _deviations(graph, diagnostics)
+    bounds = calibration.bounds.of(deviations, sensor.sigma, sensor.diameter)
     homes: dict[int, JointEvidence] = {}
     for component in graph.components:
         joint = joint_evidence(graph, component, diagnostics)
@@ -76,7 +95,21 @@ def assess(
         if chosen is not None:
             judged = result, chosen
             pairs[edge] = _assess_pair(*judged, graph, homes, diagnostics, calibration, config)
-    return Confidence(pairs=pairs, scans=_assess_scans(graph, homes, pairs, calibration, config))
+    joints = Joints(homes=homes, deviations=deviations, sensor=sensor)
+    scans = _assess_scans(graph, joints, pairs, calibration, config)
+    return Confidence(pairs=pairs, scans=scans, bounds=bounds, deviations=deviations)
+
+
+def _deviations(graph: ViewGraph, diagnostics: PairDiagnostics) -> dict[int, PoseTolerance]:
+    """Standard deviation of the pose of each placed scan."""
+    sources = dict(enumerate(diagnostics.sources))
+    return {
+        k: deviation
+        for component in graph.components
+        for k, deviation in pose_deviations(
+            sources, component.poses, graph.compared(component), diagnostics.sensor
+        ).items()
+    }
 
 
 def cap_undecided(probability: float, pair: PairResult, grounds: Grounds, config: Config) -> float:
@@ -122,7 +155,7 @@ def _assess_pair(
     at_contours = is_accepted or chosen.score > MIN_COHERENT_SCORE
     fit = diagnostics.fit(result.i, result.j, chosen.i_from_j, at_contours=at_contours)
     told = diagnostics.judge.pair(result.i, result.j, chosen.i_from_j)
-    grounds = pair_grounds(result, chosen, told, fit, joint, is_accepted)
+    grounds = pair_grounds(result, chosen, told, fit, joint, is_accepted, diagnostics.sensor)
     probability = calibration.pair.probability(grounds)
     probability = cap_undecided(probability, result, grounds, config)
     if result.rests_on_feature:
@@ -132,7 +165,7 @@ def _assess_pair(
 
 def _assess_scans(
     graph: ViewGraph,
-    homes: Mapping[int, JointEvidence],
+    joints: Joints,
     pairs: Mapping[Edge, Assessed],
     calibration: Calibration,
     config: Config,
@@ -143,7 +176,14 @@ def _assess_scans(
         tied = ties_of(component, {edge: pair.confidence for edge, pair in accepted.items()})
         for k in sorted(component.poses):
             own = [pair.grounds["coherence"] for edge, pair in accepted.items() if k in edge]
-            grounds = scan_grounds(k, homes[k], tied[k], max(own, default=0.0))
+            grounds = scan_grounds(
+                k,
+                joints.homes[k],
+                tied[k],
+                max(own, default=0.0),
+                joints.deviations[k].shift,
+                joints.sensor,
+            )
             confidence = cap_by_links(calibration.scan.probability(grounds), grounds, config)
             scans[k] = Assessed(confidence=confidence, grounds=grounds)
     return scans

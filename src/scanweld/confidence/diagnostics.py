@@ -11,6 +11,7 @@ from scanweld.evidence.judge import Judge
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
+from scanweld.sensor.model import SensorModel
 
 NUM_POINTS = 2000
 """Surface points of a scan by which misfit is measured."""
@@ -41,11 +42,13 @@ class PairDiagnostics:
         judge: Gives the evidence on any pair at any pose.
         sources: Surface points of the scans.
         contours: Compares the contours of any two scans.
+        sensor: What the set says of its sensor.
     """
 
     judge: Judge
     sources: Sequence[SurfaceSource]
     contours: ContourMatcher
+    sensor: SensorModel
 
     def fit(self, i: int, j: int, i_from_j: Pose, *, at_contours: bool) -> Fit:
         """How two scans fit at a pose; where contours are not asked about, none cohere."""
@@ -60,13 +63,14 @@ class PairDiagnostics:
 
 
 def diagnostics_of(
-    prepared: Sequence[PreparedScan], judge: Judge, config: ContoursConfig
+    prepared: Sequence[PreparedScan], judge: Judge, sensor: SensorModel, config: ContoursConfig
 ) -> PairDiagnostics:
     """Make the scans of a run ready to be measured."""
     return PairDiagnostics(
         judge=judge,
         sources=[surface_source(scan, NUM_POINTS) for scan in prepared],
         contours=contour_matcher(prepared, config),
+        sensor=sensor,
     )
 
 

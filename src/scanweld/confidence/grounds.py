@@ -11,10 +11,12 @@ from scanweld.confidence.diagnostics import Fit
 from scanweld.confidence.joint_evidence import MIN_CONDUCTANCE, JointEvidence
 from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
+from scanweld.sensor.model import SensorModel
 
 Grounds = Mapping[str, float]
 
 LEAST_SHARE = 1e-3
+LEAST_LENGTH = 1e-6
 LEAST_OBSERVABILITY = 1e-7
 MAX_MISFIT = 2.0
 MAX_CONTRADICTION = 2.0
@@ -29,6 +31,7 @@ def pair_grounds(
     fit: Fit,
     joint: JointEvidence | None,
     is_accepted: bool,
+    sensor: SensorModel,
 ) -> Grounds:
     """Grounds to believe one pose of a pair.
 
@@ -42,6 +45,7 @@ def pair_grounds(
         fit: How the two scans lie on each other in it.
         joint: The component that both scans are in, if they are in one.
         is_accepted: Whether the pose agrees with the component's.
+        sensor: What the set says of its sensor.
     """
     observability = fit.observability
     margin = margin_among(chosen, result.alternatives)
@@ -69,10 +73,18 @@ def pair_grounds(
         "support": support,
         "opposition": opposition,
         "consent": consent,
+        "noise": -_magnitude(sensor.sigma, sensor),
     }
 
 
-def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) -> Grounds:
+def scan_grounds(
+    k: int,
+    joint: JointEvidence,
+    link: float,
+    coherence: float,
+    deviation: float,
+    sensor: SensorModel,
+) -> Grounds:
     """Grounds to believe the place of a scan in its component.
 
     Args:
@@ -80,6 +92,8 @@ def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) ->
         joint: Its component.
         link: How surely pairs tie it to the reference scan.
         coherence: The best contour coherence of its accepted pairs.
+        deviation: Standard deviation of its place by information and noise, in the scans' unit.
+        sensor: What the set says of its sensor.
     """
     said, fit = joint.said_of(k), joint.fits[k]
     agree, patches = sum(e.agree for e in said), sum(e.patches for e in said)
@@ -94,7 +108,14 @@ def scan_grounds(k: int, joint: JointEvidence, link: float, coherence: float) ->
         "residual": -fit.residual,
         "misfit": -min(fit.misfit, MAX_MISFIT),
         "link": link,
+        "noise": -_magnitude(sensor.sigma, sensor),
+        "deviation": -_magnitude(deviation, sensor),
     }
+
+
+def _magnitude(length: float, sensor: SensorModel) -> float:
+    """Of a length beside the diameter, as a power of ten."""
+    return float(np.log10(max(length / sensor.diameter, LEAST_LENGTH)))
 
 
 def is_corroborated(support: float) -> bool:

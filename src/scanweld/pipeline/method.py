@@ -33,6 +33,17 @@ class Scene:
     features: Mapping[int, Features] = field(default_factory=dict)
     sensor: SensorModel | None = None
 
+    @property
+    def known_sensor(self) -> SensorModel:
+        """The same, once it is known.
+
+        Raises:
+            ValueError: If it is not.
+        """
+        if self.sensor is None:
+            raise ValueError("the pairs of the run say what its sensor does: register them first")
+        return self.sensor
+
 
 class Shortcuts(Protocol):
     """Ways to spare the thorough search where scans leave no doubt."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from scanweld.confidence.assess import Confidence, assess
-from scanweld.confidence.diagnostics import PairDiagnostics, diagnostics_of
+from scanweld.confidence.diagnostics import diagnostics_of
 from scanweld.confidence.model import stored_calibration
 from scanweld.config import Config
 from scanweld.errors import InputError
@@ -28,7 +28,6 @@ from scanweld.pipeline.problem import graph_problem
 from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
 from scanweld.refinement.scale import ScaleEstimate, estimate_scales
-from scanweld.sensor.accuracy import pose_deviations
 from scanweld.sensor.standing import standing_scans
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
@@ -142,10 +141,10 @@ def assess_placed(
 ) -> tuple[ViewGraph, Confidence]:
     """How probable it is that each pose is right; scans below ``min_good`` are marked doubtful."""
     with stages.stage("confidence") as counts:
-        diagnostics = diagnostics_of(scene.intake.prepared, scene.judge, config.contours)
+        diagnostics = diagnostics_of(
+            scene.intake.prepared, scene.judge, scene.known_sensor, config.contours
+        )
         confidence = assess(graph, diagnostics, stored_calibration(), config)
-        bounds, deviations = _bounds(scene, graph, diagnostics)
-        confidence = replace(confidence, bounds=bounds, deviations=deviations)
         unsure = {
             k: f"its pose is right with a probability of {found.confidence:.0%} only"
             for k, found in confidence.scans.items()
@@ -153,7 +152,7 @@ def assess_placed(
         }
         doubts = merged(
             graph.doubts,
-            doubt_of(DoubtCode.INEXACT, _inexact(bounds, scene, config)),
+            doubt_of(DoubtCode.INEXACT, _inexact(confidence.bounds, scene, config)),
             doubt_of(DoubtCode.CONFIDENCE, unsure),
         )
         graph = replace(graph, doubts=doubts)
@@ -175,21 +174,6 @@ def _inexact(bounds: Mapping[int, PoseTolerance], scene: Scene, config: Config) 
         for k, far in percent.items()
         if far > asked
     }
-
-
-def _bounds(
-    scene: Scene, graph: ViewGraph, diagnostics: PairDiagnostics
-) -> tuple[dict[int, PoseTolerance], dict[int, PoseTolerance]]:
-    """How far the pose of each placed scan may be off, and its standard deviation."""
-    if scene.sensor is None:
-        return {}, {}
-    sources, sensor = dict(enumerate(diagnostics.sources)), scene.sensor
-    deviations: dict[int, PoseTolerance] = {}
-    for component in graph.components:
-        compared = graph.compared(component)
-        deviations.update(pose_deviations(sources, component.poses, compared, sensor))
-    bounds = stored_calibration().bounds.of(deviations, sensor.sigma, sensor.diameter)
-    return bounds, deviations
 
 
 def check_knowledge(
