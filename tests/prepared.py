@@ -14,6 +14,8 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.pairs.problem import PairProblem
 from scanweld.preparation import prepare
+from scanweld.sensor.learn import learn_sensor
+from scanweld.sensor.model import SensorModel
 from tests.scenes import Scene, pair_at_gap
 
 
@@ -25,6 +27,12 @@ class PreparedPair:
     fields: tuple[ScanField, ScanField]
     i_from_j: Pose
     diameter: float
+
+    def sensor(self) -> SensorModel:
+        """What the pair says of its sensor: too little, so that usual values are used."""
+        tolerance = PairsConfig().fine_tolerance_diameters * self.diameter
+        limit = PairsConfig().max_contradiction
+        return learn_sensor({}, self.fields, self.diameter, tolerance, limit)
 
     def problem(self, config: PairsConfig | None = None) -> PairProblem:
         """The pair as the search is asked."""

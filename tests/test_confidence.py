@@ -156,7 +156,9 @@ def test_pairs_conduct_like_wires(monkeypatch: pytest.MonkeyPatch):
     pair = creature_pair(40)
     judge = replace(pair.judge(), fields=pair.fields + pair.fields)
     contours = contour_matcher(pair.scans, CONFIG.contours)
-    diagnostics = PairDiagnostics(judge=judge, sources=[], contours=contours)
+    diagnostics = PairDiagnostics(
+        judge=judge, sources=[], contours=contours, sensor=pair.sensor()
+    )
     joint = joint_evidence(graph, component, diagnostics)
     assert joint.conductance[0, 1] == pytest.approx(0.7, abs=1e-3)
     assert joint.conductance_without((0, 1), 0.4) == pytest.approx(0.3, abs=1e-3)
@@ -219,7 +221,7 @@ def assessed(
     component = Component(poses={0: Pose.identity(), 1: best.i_from_j}, reference=0)
     graph = graph_with({(0, 1): found}, component)
     graph = replace(graph, usable={(0, 1): usable}, accepted={(0, 1): best})
-    diagnostics = diagnostics_of(pair.scans, pair.judge(), CONFIG.contours)
+    diagnostics = diagnostics_of(pair.scans, pair.judge(), pair.sensor(), CONFIG.contours)
     return assess(graph, diagnostics, stored_calibration(), CONFIG)
 
 
