@@ -39,17 +39,26 @@ def info(
     ],
 ) -> None:
     """Show what was read from scan files, and what was assumed."""
-    from scanweld.io import collect, read_scan
+    from scanweld.io import collect
     from scanweld.preparation.info import describe_scan
 
     failed = False
     for file in collect(files):
         try:
-            typer.echo(describe_scan(read_scan(file.path, file.name)))
+            typer.echo(describe_scan(file.read()))
         except ScanweldError as error:
             _print_error(error)
             failed = True
     raise typer.Exit(ERROR if failed else 0)
+
+
+@app.command()
+def formats() -> None:
+    """List the formats of scans that can be read, and what a scan gets from each."""
+    from scanweld.io.scan_formats.registry import format_rows
+
+    for suffixes, title, kept in format_rows():
+        typer.echo(f"{suffixes}\n    {title}\n    kept besides points: {kept}")
 
 
 @app.command()

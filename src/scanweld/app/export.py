@@ -12,7 +12,7 @@ from scanweld.errors import InputError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import natural_key, path_from, write_whole
+from scanweld.io import ScanFile, natural_key, path_from, write_whole
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan
@@ -42,7 +42,7 @@ def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -
     model = open_model(folder)
     poses = _component(model, wanted)
     files = _find_files(model, poses, wanted)
-    parts = [folder / "poses.json", *files.values()]
+    parts = [folder / "poses.json", *(file.path for file in files.values())]
     with Workspace(output, inputs=parts, force=force) as workspace:
         contents, notes = _render(model, poses, files, wanted, workspace.output)
         for name, data in contents.items():
@@ -73,7 +73,9 @@ def _component(model: ModelFolder, wanted: Wanted) -> dict[str, Pose]:
     return {name: model.poses.poses[name] for name in names}
 
 
-def _find_files(model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted) -> dict[str, Path]:
+def _find_files(
+    model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted
+) -> dict[str, ScanFile]:
     """The scans' files, as far as they are needed."""
     formats = [FORMATS[name] for name in wanted.poses]
     if wanted.points or any(f.needs_files or f.frame is Frame.SENSOR for f in formats):
@@ -84,7 +86,7 @@ def _find_files(model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted) -
 def _render(
     model: ModelFolder,
     poses: Mapping[str, Pose],
-    files: Mapping[str, Path],
+    files: Mapping[str, ScanFile],
     wanted: Wanted,
     output: Path,
 ) -> tuple[dict[str, bytes], list[str]]:
@@ -110,7 +112,7 @@ def _render(
 def _posed(
     name: str,
     pose: Pose,
-    files: Mapping[str, Path],
+    files: Mapping[str, ScanFile],
     sensors: Mapping[str, RangeScan],
     output: Path,
 ) -> PosedScan:
@@ -118,7 +120,7 @@ def _posed(
     return PosedScan(
         name=name,
         world_from_scan=pose,
-        file=path_from(output, files[name]) if name in files else None,
+        file=path_from(output, files[name].path) if name in files else None,
         camera=None if located is None else located.camera,
         scan_from_sensor=None if located is None else located.scan_from_sensor,
     )

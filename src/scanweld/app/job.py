@@ -10,12 +10,12 @@ from scanweld.app.cache import FileCache, cache_folder
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
-from scanweld.app.outputs import write_outputs
+from scanweld.app.outputs import Place, write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import ScanFile, collect, path_from, printable, read_scan
+from scanweld.io import ScanFile, collect, path_from, printable
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline import run as pipeline
 from scanweld.preparation.thinning import thinned
@@ -75,7 +75,7 @@ def run_job(
             no such cluster. Files that cannot be read are named in the result instead.
     """
     files, workers, memory = collect(inputs), limits.workers, limits.memory
-    paths = [file.path for file in files]
+    paths = list(dict.fromkeys(file.path for file in files))
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
         Workspace(Path(output), inputs=paths, force=force) as workspace,
@@ -95,7 +95,7 @@ def run_job(
             cache=cache,
             progress=progress,
         )
-        places = relative_paths(files, workspace.output)
+        places = relative_places(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
         with telling(progress, "report"):
             write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
@@ -113,9 +113,12 @@ def _runner(scheduler: str | None) -> AbstractContextManager[Runner | None]:
     return Cluster(scheduler)
 
 
-def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:
-    """Where each scan's file is, by the scan's name, as seen from a folder."""
-    return {file.name: printable(path_from(folder, file.path)) for file in files}
+def relative_places(files: Sequence[ScanFile], folder: Path) -> dict[str, Place]:
+    """Where each scan is, by the scan's name: its file as seen from a folder, and its part."""
+    return {
+        file.name: Place(file=printable(path_from(folder, file.path)), part=file.part)
+        for file in files
+    }
 
 
 def read_all(
@@ -127,7 +130,7 @@ def read_all(
     with telling(progress, "read") as counts:
         for done, file in enumerate(files, start=1):
             try:
-                scan = read_scan(file.path, file.name)
+                scan = file.read()
                 scans.append(scan if max_points is None else thinned(scan, max_points))
             except ReadError as error:
                 unreadable[file.name] = printable(str(error))

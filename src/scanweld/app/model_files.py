@@ -20,9 +20,10 @@ class Entry(BaseModel):
 
 
 class FileEntry(Entry):
-    """Where a scan's file is, as seen from the folder, and the hash of the scan's content."""
+    """Where a scan is, as seen from the folder, and the hash of its content."""
 
     file: str | None = None
+    part: int = 0
     content_hash: str | None = None
 
 

@@ -10,7 +10,7 @@ from scanweld.config import Unit, load_config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
+from scanweld.io import PoseSet, ScanFile, collect, read_mesh, read_poses
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.thinning import thinned
 from scanweld.reconstruction import Reconstruction, ScanVerdict
@@ -84,7 +84,9 @@ class ModelFolder:
         settings = self.path / "config.toml"
         return load_config(settings).unit if settings.is_file() else None
 
-    def scan_files(self, names: Iterable[str], given: Sequence[Path | str] = ()) -> dict[str, Path]:
+    def scan_files(
+        self, names: Iterable[str], given: Sequence[Path | str] = ()
+    ) -> dict[str, ScanFile]:
         """Where the files of some scans are: among those given, else where the report says.
 
         Args:
@@ -95,18 +97,18 @@ class ModelFolder:
             InputError: If one of them is not there.
             ReadError: If the report is broken.
         """
-        found = {file.name: file.path for file in collect(given)} if given else self._told_files()
+        found = {file.name: file for file in collect(given)} if given else self._told_files()
         names = list(names)
         for name in names:
-            if name not in found or not found[name].is_file():
-                place = f" ({found[name]})" if name in found else ""
+            if name not in found or not found[name].path.is_file():
+                place = f" ({found[name].path})" if name in found else ""
                 where = "among the scans given" if given else f"where the model says{place}"
                 raise InputError(
                     f"{printed(name)}: its file is not {where}; name all scans with --scans"
                 )
         return {name: found[name] for name in names}
 
-    def read_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+    def read_scans(self, files: Mapping[str, ScanFile]) -> dict[str, RangeScan]:
         """Scans as the model's maker took them: thinned where it had to save memory.
 
         Args:
@@ -116,16 +118,16 @@ class ModelFolder:
             InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        return {name: self._as_taken(read_scan(path, name)) for name, path in files.items()}
+        return {name: self._as_taken(file.read()) for name, file in files.items()}
 
-    def read_whole_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+    def read_whole_scans(self, files: Mapping[str, ScanFile]) -> dict[str, RangeScan]:
         """The same with all of their points.
 
         Raises:
             InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        scans = {name: read_scan(path, name) for name, path in files.items()}
+        scans = {name: file.read() for name, file in files.items()}
         for scan in scans.values():
             self._as_taken(scan)
         return scans
@@ -146,9 +148,12 @@ class ModelFolder:
         report = self.path / "report.json"
         return read_entries(report, Files) if report.is_file() else Files(scans={})
 
-    def _told_files(self) -> Mapping[str, Path]:
-        scans = self._files.scans
-        return {name: self.path / scan.file for name, scan in scans.items() if scan.file}
+    def _told_files(self) -> Mapping[str, ScanFile]:
+        return {
+            name: ScanFile(path=self.path / scan.file, name=name, part=scan.part)
+            for name, scan in self._files.scans.items()
+            if scan.file
+        }
 
 
 def open_model(path: Path, result: Reconstruction | None = None) -> ModelFolder:

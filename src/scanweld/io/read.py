@@ -1,37 +1,32 @@
 """One door for all formats: ``read_scan`` and ``read_mesh``."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 
 from scanweld.errors import ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
-from scanweld.io.mesh_formats import read_obj, read_off, read_stl
-from scanweld.io.ply import read_ply
 from scanweld.io.raw import RawScan, to_mesh, to_scan
-from scanweld.io.xyz import read_xyz
-
-Reader = Callable[[Path, bytes], RawScan]
-
-READERS: dict[str, Reader] = {
-    **{".ply": read_ply, ".obj": read_obj, ".off": read_off, ".stl": read_stl},
-    **dict.fromkeys((".xyz", ".pts", ".asc", ".txt", ".csv"), read_xyz),
-}
-"""Suffix in lower case -> reader."""
+from scanweld.io.scan_formats.records import Keeps, Part
+from scanweld.io.scan_formats.registry import format_of, formats_by_suffix, stem_of
 
 
-def read_scan(path: Path | str, name: str | None = None) -> RangeScan:
+def read_scan(path: Path | str, name: str | None = None, *, part: int = 0) -> RangeScan:
     """Read a file as one scan, in the coordinates and the unit of the file.
 
     Args:
-        path: A PLY file, a mesh (OBJ, OFF, STL) or text (XYZ, PTS, ASC, TXT, CSV).
+        path: A file in any of the formats that ``scanweld formats`` lists.
         name: The scan's name; the file's stem if not given.
+        part: Which of its scans, from 0, where a file holds several.
 
     Raises:
         ReadError: If the file cannot be read as a scan; the message says why and what to do.
     """
     path = Path(path)
-    return to_scan(path, path.stem if name is None else name, _read(path))
+    parts = _parts(path)
+    if not 0 <= part < len(parts):
+        raise ReadError(f"{path}: has no scan {part + 1}, but {len(parts)}; was it changed?")
+    return to_scan(path, stem_of(path) if name is None else name, parts[part].read())
 
 
 def read_mesh(path: Path | str) -> TriangleMesh:
@@ -41,17 +36,41 @@ def read_mesh(path: Path | str) -> TriangleMesh:
         ReadError: If the file cannot be read or has no faces.
     """
     path = Path(path)
-    return to_mesh(path, _read(path))
+    return to_mesh(path, _parts(path)[0].read())
 
 
-def _read(path: Path) -> RawScan:
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise ReadError(f"{path}: unknown format; scanweld reads {', '.join(READERS)}")
+def part_names(path: Path) -> tuple[str, ...]:
+    """What a file calls its scans, empty where it does not; of one that is broken, one such name.
+
+    Only files whose format can hold several scans are opened.
+    """
+    form = format_of(path)
+    if form is None or Keeps.SCANS not in form.keeps:
+        return ("",)
+    try:
+        return tuple(part.name for part in _parts(path))
+    except ReadError:  # reading says what is wrong
+        return ("",)
+
+
+def unknown_format(path: Path) -> ReadError:
+    """What is said of a file whose format is not known."""
+    return ReadError(f"{path}: unknown format; scanweld reads {', '.join(formats_by_suffix())}")
+
+
+def _parts(path: Path) -> Sequence[Part]:
+    """The scans of a file, at least one."""
+    form = format_of(path)
+    if form is None:
+        raise unknown_format(path)
     try:
         data = path.read_bytes()
     except OSError as error:
         raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     if not data:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
-    return reader(path, data)
+    found = form.read(path, data)
+    parts = [Part(read=lambda: found)] if isinstance(found, RawScan) else found
+    if not parts:
+        raise ReadError(f"{path}: holds no scans; leave it out")
+    return parts

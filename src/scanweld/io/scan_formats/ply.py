@@ -1,4 +1,4 @@
-"""PLY files as range scans and meshes: what their elements and properties mean."""
+"""PLY of Stanford, ASCII or binary: points, range grids and meshes, with a sensor's place."""
 
 import logging
 from collections.abc import Sequence
@@ -15,6 +15,7 @@ from scanweld.io.matrices import pose_from_numbers
 from scanweld.io.ply_body import Columns, Ragged, decode_body
 from scanweld.io.ply_header import PlyElement, PlyHeader, parse_header
 from scanweld.io.raw import RawScan, fan_triangles, to_bytes
+from scanweld.io.scan_formats.records import Keeps, ScanFormat
 
 logger = logging.getLogger(__name__)
 
@@ -203,3 +204,10 @@ def _sensor_pose(header: PlyHeader) -> Pose | None:
             f"{header.path}: 'obj_info {POSE_KEY}' is not a rigid motion of 16 numbers ({error}); "
             "correct or remove the line"
         ) from error
+
+
+FORMAT = ScanFormat(
+    suffixes=(".ply",),
+    read=read_ply,
+    keeps=(Keeps.GRID, Keeps.SENSOR, Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
+)
