@@ -49,7 +49,8 @@ def collect(inputs: Sequence[Path | str]) -> tuple[ScanFile, ...]:
 
     Names are the files' stems; if two share one, all names become paths relative to the common
     parent, without suffix unless that is needed to tell them apart. Several scans of one file are
-    called as the file calls them, if they then differ from all others, else ``stem_1``, ``stem_2``.
+    called as the file calls them, or ``stem_1``, ``stem_2``; if that is another scan's name too,
+    ``stem.suffix/1`` and so on.
 
     Raises:
         ReadError: If a named file is missing or of an unknown format.
@@ -63,7 +64,11 @@ def collect(inputs: Sequence[Path | str]) -> tuple[ScanFile, ...]:
     parts = [(path, k, own) for path in absolute for k, own in enumerate(_own_names(path))]
     names = [own or stems[path] for path, _, own in parts]
     if len(set(names)) < len(names):
-        names = [stems[path] + (f"_{k + 1}" if own else "") for path, k, own in parts]
+        # A file is no folder, too: this can be no other scan's name.
+        names = [
+            f"{stems[path].removesuffix(path.suffix)}{path.suffix}/{k + 1}" if own else stems[path]
+            for path, k, own in parts
+        ]
     return tuple(
         ScanFile(path=found[path], name=printable(name), part=k)
         for (path, k, _), name in zip(parts, names, strict=True)

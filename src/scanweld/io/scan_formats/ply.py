@@ -1,7 +1,6 @@
 """PLY of Stanford, ASCII or binary: points, range grids and meshes, with a sensor's place."""
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.io.matrices import pose_from_numbers
 from scanweld.io.ply_body import Columns, Ragged, decode_body
 from scanweld.io.ply_header import PlyElement, PlyHeader, parse_header
-from scanweld.io.raw import RawScan, fan_triangles, to_bytes
+from scanweld.io.raw import RawScan, fan_triangles, side_by_side, to_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 
 logger = logging.getLogger(__name__)
@@ -81,7 +80,7 @@ def read_ply(path: Path, data: bytes) -> RawScan:
 def _stack(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
     """Scalar columns side by side (N, k), or None if one is missing."""
     found = _scalars(columns, names)
-    return None if found is None else _doubles(found)
+    return None if found is None else side_by_side(found)
 
 
 def _column(columns: Columns, name: str) -> FloatArray | None:
@@ -97,14 +96,6 @@ def _scalars(columns: Columns, names: tuple[str, ...]) -> list[NDArray] | None:
     return scalars if len(scalars) == len(names) else None
 
 
-def _doubles(columns: Sequence[NDArray]) -> FloatArray:
-    """Columns side by side (N, k)."""
-    values = np.empty((len(columns[0]), len(columns)))
-    for k, column in enumerate(columns):
-        values[:, k] = column
-    return values
-
-
 def _bytes(
     path: Path, element: PlyElement, columns: Columns, names: tuple[str, ...]
 ) -> ByteArray | None:
@@ -115,7 +106,7 @@ def _bytes(
         return None
     if all(types[name] == "u1" for name in names):
         return np.stack(found, axis=1)
-    scaled = to_bytes(_doubles(found), types[names[0]])
+    scaled = to_bytes(side_by_side(found), types[names[0]])
     if scaled is None:
         logger.warning("%s: %s are on no known scale, so they are left out", path, ", ".join(names))
     return scaled

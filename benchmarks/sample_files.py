@@ -1,0 +1,121 @@
+"""Small files of every format of scans, made here: what readers are tested and mutated with.
+
+All show the same surface, of 6 rows and 7 columns, of which two cells saw nothing.
+"""
+
+import struct
+
+import numpy as np
+
+from scanweld.geometry.arrays import ByteArray, FloatArray
+
+ROWS, COLUMNS = 6, 7
+HOLES = ((0, 0), (3, 4))
+GROUND = np.array([[0, -1, 0, 10], [1, 0, 0, 20], [0, 0, 1, -3], [0, 0, 0, 1]], dtype=np.float64)
+"""world_from_scan (4, 4) of the second scan of files that hold two; the first's is the identity."""
+
+
+def surface() -> FloatArray:
+    """Points (6, 7, 3), exact in single precision; NaN where nothing was seen."""
+    v, u = np.mgrid[:ROWS, :COLUMNS].astype(np.float64)
+    points = np.stack([u / 4, v / 4, 8 + (u - 3) ** 2 / 32 + v * u / 64], axis=-1)
+    for hole in HOLES:
+        points[hole] = np.nan
+    return points
+
+
+def colors() -> ByteArray:
+    """Their colours (42, 3), row after row."""
+    return (np.arange(3 * ROWS * COLUMNS).reshape(-1, 3) * 2 % 256).astype(np.uint8)
+
+
+def pcd_head(fields: str, sizes: str, types: str, data: str, counts: str = "") -> bytes:
+    """The header of a PCD file of the surface."""
+    counts = counts or " ".join("1" for _ in fields.split())
+    return (
+        f"# .PCD v0.7\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n"
+        f"WIDTH {COLUMNS}\nHEIGHT {ROWS}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {ROWS * COLUMNS}\n"
+        f"DATA {data}\n"
+    ).encode()
+
+
+def pcd_ascii() -> bytes:
+    """With padding of four numbers a point, as old versions of PCL write it."""
+    lines = [f"{x:g} {y:g} {z:.9g} 0 0 128 63" for x, y, z in surface().reshape(-1, 3)]
+    head = pcd_head("x y z _", "4 4 4 1", "F F F U", "ascii", "1 1 1 4")
+    return head + "\n".join(lines).encode() + b"\n"
+
+
+def packed_colors() -> FloatArray:
+    """The colours as bits 0x00RRGGBB of single precision numbers (42,)."""
+    red, green, blue = colors().astype(np.uint32).T
+    return (red << 16 | green << 8 | blue).view(np.float32)
+
+
+def pcd_binary() -> bytes:
+    """With padding between the fields and packed colours."""
+    table = np.zeros(ROWS * COLUMNS, "<f4, <f4, <f4, <u4, <f4, <u2")
+    for k, column in enumerate(surface().reshape(-1, 3).T):
+        table[f"f{k}"] = column
+    table["f4"] = packed_colors()
+    head = pcd_head("x y z _ rgb label", "4 4 4 1 4 2", "F F F U F U", "binary", "1 1 1 4 1 1")
+    return head + table.tobytes()
+
+
+def pcd_compressed() -> bytes:
+    """Field after field, in LZF."""
+    fields = [*surface().reshape(-1, 3).T.astype("<f4"), packed_colors()]
+    whole = b"".join(field.tobytes() for field in fields)
+    packed = lzf_compress(whole)
+    head = pcd_head("x y z rgb", "4 4 4 4", "F F F F", "binary_compressed")
+    return head + struct.pack("<II", len(packed), len(whole)) + packed
+
+
+def lzf_compress(data: bytes) -> bytes:
+    """LZF that copies what lies four bytes before, as in columns of like numbers, and no more."""
+    out, at, literal = bytearray(), 0, bytearray()
+
+    def flush() -> None:
+        for begin in range(0, len(literal), 32):
+            run = literal[begin : begin + 32]
+            out.extend([len(run) - 1, *run])
+        literal.clear()
+
+    while at < len(data):
+        length = 0
+        while at >= 4 and at + length < len(data) and data[at + length] == data[at + length - 4]:
+            length += 1
+        length = min(length, 264)
+        if length < 3:
+            literal.append(data[at])
+            at += 1
+            continue
+        flush()
+        out.extend([(length - 2) << 5, 3] if length < 9 else [7 << 5, length - 9, 3])
+        at += length
+    flush()
+    return bytes(out)
+
+
+def ptx() -> bytes:
+    """Two scans, the second with colours."""
+    cells = np.nan_to_num(surface()).transpose(1, 0, 2).reshape(-1, 3)
+    shades = colors().reshape(ROWS, COLUMNS, 3).transpose(1, 0, 2).reshape(-1, 3)
+    text = ""
+    for matrix in (np.eye(4), GROUND):
+        text += f"{COLUMNS}\n{ROWS}\n"
+        for row in (matrix[:3, 3], *matrix[:3, :3].T, *matrix.T):
+            text += " ".join(f"{number:g}" for number in row) + "\n"
+        for point, shade in zip(cells, shades, strict=True):
+            color = " {} {} {}".format(*shade) if matrix is GROUND else ""
+            text += "{:g} {:g} {:.9g} 0.5".format(*point) + color + "\n"
+    return text.encode()
+
+
+SAMPLES = {
+    "ascii.pcd": pcd_ascii,
+    "binary.pcd": pcd_binary,
+    "compressed.pcd": pcd_compressed,
+    "two.ptx": ptx,
+}
+"""Makers of the files by their names."""

@@ -1,0 +1,157 @@
+"""Files of scans that other programs write: grid, pose and colours kept, all else told."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.sample_files import (
+    COLUMNS,
+    GROUND,
+    HOLES,
+    ROWS,
+    SAMPLES,
+    colors,
+    pcd_binary,
+    pcd_compressed,
+    pcd_head,
+    surface,
+)
+from scanweld.errors import ReadError
+from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io import collect, read_scan
+from scanweld.io.raw import POSE_NOTE
+from scanweld.io.scans import read_scans
+
+SEEN = np.isfinite(surface()).all(axis=2)
+
+
+def write(folder: Path, name: str, data: bytes | None = None) -> Path:
+    """A sample, or other bytes, as a file."""
+    path = folder / name
+    path.write_bytes(SAMPLES[name]() if data is None else data)
+    return path
+
+
+def assert_is_surface(scan: RangeScan) -> None:
+    """A scan shows the samples' surface, with its grid."""
+    assert scan.grid is not None and scan.grid.shape == (ROWS, COLUMNS)
+    np.testing.assert_array_equal(scan.grid >= 0, SEEN)
+    assert scan.num_dropped == len(HOLES)
+    np.testing.assert_allclose(scan.points[scan.grid[SEEN]], surface()[SEEN], rtol=1e-7)
+
+
+def assert_has_colors(scan: RangeScan) -> None:
+    assert scan.grid is not None and scan.colors is not None
+    np.testing.assert_array_equal(
+        scan.colors[scan.grid[SEEN]], colors().reshape(ROWS, COLUMNS, 3)[SEEN]
+    )
+
+
+@pytest.mark.parametrize("name", ["ascii.pcd", "binary.pcd", "compressed.pcd"])
+def test_pcd_of_every_kind_keeps_grid_and_colors(name: str, tmp_path: Path):
+    scan = read_scan(write(tmp_path, name))
+    assert_is_surface(scan)
+    assert scan.viewpoint is Viewpoint.UNKNOWN
+    if name == "ascii.pcd":
+        assert scan.colors is None
+    else:
+        assert_has_colors(scan)
+    assert scan.notes == (("fields left out: label",) if name == "binary.pcd" else ())
+
+
+def pcd_of(told: str, *lines: str, viewpoint: str = "0 0 0 1 0 0 0") -> bytes:
+    """An ASCII PCD without a grid; ``told`` are its fields, all single precision."""
+    count = len(told.split())
+    kinds = f"SIZE {'4 ' * count}\nTYPE {'F ' * count}\nWIDTH {len(lines)}\nHEIGHT 1"
+    head = f"FIELDS {told}\r\n{kinds}\nVIEWPOINT {viewpoint}\nDATA ascii\n"
+    return (head + "\n".join(lines)).encode()
+
+
+def test_pcd_normals_intensity_and_colors_written_as_numbers(tmp_path: Path):
+    lines = ["0 0 1 0 0 -1 4.2108e+06", "1 0 1 0 0 -1 0", "0 1 nan 0 0 -1 255"]
+    scan = read_scan(
+        write(tmp_path, "a.pcd", pcd_of("x y z normal_x normal_y normal_z rgb", *lines))
+    )
+    assert scan.normals is not None and scan.colors is not None
+    np.testing.assert_array_equal(scan.normals, [[0, 0, -1]] * 2)
+    np.testing.assert_array_equal(scan.colors, [[64, 64, 112], [0, 0, 0]])
+    tiny = np.uint32(0x0A141E).view(np.float32)
+    scan = read_scan(write(tmp_path, "b.pcd", pcd_of("X Y Z RGB", f"0 0 1 {tiny:.9g}", "1 0 1 0")))
+    assert scan.colors is not None
+    np.testing.assert_array_equal(scan.colors, [[10, 20, 30], [0, 0, 0]])
+    scan = read_scan(write(tmp_path, "c.pcd", pcd_of("x y z intensity", "0 0 1 0.2", "1 0 1 1")))
+    assert scan.notes == ("intensity read as grey",)
+
+
+def test_pcd_viewpoint_is_believed_if_it_sees_the_points(tmp_path: Path):
+    lines = [f"{x} {y} {5 + x * y / 9}" for x in range(4) for y in range(4)]
+
+    def read(viewpoint: str) -> RangeScan:
+        return read_scan(write(tmp_path, "a.pcd", pcd_of("x y z", *lines, viewpoint=viewpoint)))
+
+    scan = read("1.5 1.5 -2 1 0 0 0")
+    assert scan.viewpoint is Viewpoint.GIVEN and "VIEWPOINT" in scan.notes[0]
+    np.testing.assert_allclose(scan.sensor_pose.translation, [1.5, 1.5, -2])
+    assert scan.sensor_pose.rotation[2, 2] > 0.99
+    # The whole scan turned over is no reason to look away from it: Kinect tutorials write that.
+    assert read("0 0 0 0 1 0 0").sensor_pose.rotation[2, 2] > 0.8
+    scan = read("1.5 1.5 5.2 1 0 0 0")
+    assert scan.viewpoint is Viewpoint.UNKNOWN and "left out" in scan.notes[0]
+    assert read("0 0 0 1 0 0 0").viewpoint is Viewpoint.UNKNOWN
+
+
+def test_ptx_gives_several_scans_with_poses(tmp_path: Path):
+    path = write(tmp_path, "two.ptx")
+    assert [(file.name, file.part) for file in collect([tmp_path])] == [("two_1", 0), ("two_2", 1)]
+    first, second = read_scans(path)
+    assert (first.name, second.name) == ("two_1", "two_2")
+    for scan in (first, second):
+        assert_is_surface(scan)
+    assert first.notes == ("intensity read as grey",) and second.notes == (POSE_NOTE,)
+    assert_has_colors(second)
+    assert first.world_from_scan is not None and second.world_from_scan is not None
+    np.testing.assert_array_equal(first.world_from_scan.matrix(), np.eye(4))
+    np.testing.assert_array_equal(second.world_from_scan.matrix(), GROUND)
+    assert first.content_hash() != second.content_hash()  # colours
+    with pytest.raises(ReadError, match="has no scan 3, but 2"):
+        read_scan(path, part=2)
+
+
+def test_names_of_several_scans_do_not_clash(tmp_path: Path):
+    write(tmp_path, "two.ptx")
+    lines = SAMPLES["two.ptx"]().splitlines(keepends=True)
+    write(tmp_path, "two_1.ptx", b"".join(lines[: 10 + ROWS * COLUMNS]))
+    files = collect([tmp_path])
+    assert [file.name for file in files] == ["two.ptx/1", "two.ptx/2", "two_1"]
+    assert [file.part for file in files] == [0, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.pcd", b"hello\n", "no line DATA"),
+        ("a.pcd", pcd_head("x y", "4 4", "F F", "ascii") + b"0 0\n" * 42, "lack x, y or z"),
+        ("a.pcd", pcd_head("x y z", "4 4", "F F F", "ascii"), "as many SIZE"),
+        ("a.pcd", pcd_head("x y z", "4 4 3", "F F F", "ascii"), "SIZE 3"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "zip"), "unknown DATA 'zip'"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 0 0\n", "is shorter than 42"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 0 0\n" * 43, "longer"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 a 0\n" * 42, "line 12: 'a'"),
+        ("a.pcd", pcd_binary()[:-1], "shorter"),
+        ("a.pcd", pcd_binary() + b"1", "longer"),
+        ("a.pcd", pcd_binary().replace(b"POINTS 42", b"POINTS 43"), "WIDTH x HEIGHT"),
+        ("a.pcd", pcd_compressed()[:-9], "shorter"),
+        # The first thing compressed is a copy of what is not there.
+        ("a.pcd", re.sub(rb"(?s)(?<=compressed\n.{8}).", b"\xe0", pcd_compressed()), "broken"),
+        ("a.pcd", pcd_binary().replace(b"WIDTH 7", b"WIDTH 0"), "WIDTH x HEIGHT"),
+        ("a.ptx", b"3\n2\n0 0 0\n", "no scan of a PTX file begins here"),
+        ("a.ptx", SAMPLES["two.ptx"]()[:-900], "scan 2 has"),
+        ("a.ptx", SAMPLES["two.ptx"]() + b"7\n", "line 105: no scan"),
+    ],
+)
+def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_path: Path):
+    with pytest.raises(ReadError, match=says) as caught:
+        read_scan(write(tmp_path, name, data))
+    assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
