@@ -3,9 +3,14 @@
 All show the same surface, of 6 rows and 7 columns, of which two cells saw nothing.
 """
 
+import gzip
+import json
 import struct
+from collections.abc import Callable
+from io import BytesIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scanweld.geometry.arrays import ByteArray, FloatArray
 
@@ -112,10 +117,95 @@ def ptx() -> bytes:
     return text.encode()
 
 
-SAMPLES = {
+def ply_organised() -> bytes:
+    """With capitals and NaN, as PCL writes grids."""
+    head = f"ply\nformat binary_little_endian 1.0\nobj_info num_cols {COLUMNS}\n"
+    head += f"obj_info num_rows {ROWS}\nelement vertex {ROWS * COLUMNS}\n"
+    head += "".join(f"property float {axis}\n" for axis in "XYZ") + "end_header\n"
+    return head.encode() + surface().astype("<f4").tobytes()
+
+
+def npy(array: NDArray) -> bytes:
+    """An array as NumPy saves it."""
+    stream = BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def npz() -> bytes:
+    """Points as a grid, with colours."""
+    stream = BytesIO()
+    np.savez_compressed(stream, points=surface(), colors=colors().reshape(ROWS, COLUMNS, 3))
+    return stream.getvalue()
+
+
+def vtk(*, is_binary: bool) -> bytes:
+    """A structured grid with cell data before the colours of the points."""
+    points = np.nan_to_num(surface()).reshape(-1, 3)
+    kind = "BINARY" if is_binary else "ASCII"
+    body = f"# vtk DataFile Version 4.2\na scan\n{kind}\nDATASET STRUCTURED_GRID\n".encode()
+    body += f"DIMENSIONS {COLUMNS} {ROWS} 1\nPOINTS {len(points)} float\n".encode()
+    body += _vtk_values(points, ">f4", is_binary)
+    body += b"METADATA\nINFORMATION 0\n\nCELL_DATA 2\nSCALARS id int 1\nLOOKUP_TABLE default\n"
+    body += _vtk_values(np.array([7, 9]), ">i4", is_binary)
+    body += f"POINT_DATA {len(points)}\nCOLOR_SCALARS rgb 3\n".encode()
+    return body + _vtk_values(colors() / (1 if is_binary else 255), ">u1", is_binary)
+
+
+def _vtk_values(values: NDArray, kind: str, is_binary: bool) -> bytes:
+    if is_binary:
+        return values.astype(kind).tobytes() + b"\n"
+    return " ".join(f"{value:.9g}" for value in values.ravel()).encode() + b"\n"
+
+
+def glb() -> bytes:
+    """Two triangles and two points under nodes that turn, scale and shift."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype="<f4")
+    corners = np.array([0, 1, 2, 0, 2, 3], dtype="<u2")
+    body = points.tobytes() + corners.tobytes()
+    content = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [1]}],
+        "nodes": [
+            {"mesh": 0, "scale": [2, 2, 2], "rotation": [0, 0, 0.5**0.5, 0.5**0.5]},
+            {"children": [0, 2], "translation": [4e6, 5e5, 0.25]},
+            {"mesh": 1, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 7, 1]},
+        ],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]},
+            {"primitives": [{"attributes": {"POSITION": 2}, "mode": 0}]},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"},
+            {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 12},
+            {"buffer": 0, "byteOffset": 12, "byteLength": 36, "byteStride": 24},
+        ],
+        "buffers": [{"byteLength": len(body)}],
+    }
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(body), b"BIN\0") + body
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+SAMPLES: dict[str, Callable[[], bytes]] = {
     "ascii.pcd": pcd_ascii,
     "binary.pcd": pcd_binary,
     "compressed.pcd": pcd_compressed,
     "two.ptx": ptx,
+    "organised.ply": ply_organised,
+    "packed.pcd.gz": lambda: gzip.compress(pcd_binary(), mtime=0),
+    "grid.npy": lambda: npy(surface()),
+    "grid.npz": npz,
+    "ascii.vtk": lambda: vtk(is_binary=False),
+    "binary.vtk": lambda: vtk(is_binary=True),
+    "nodes.glb": glb,
 }
 """Makers of the files by their names."""

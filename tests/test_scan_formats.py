@@ -1,6 +1,9 @@
 """Files of scans that other programs write: grid, pose and colours kept, all else told."""
 
+import gzip
 import re
+import zipfile
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +16,20 @@ from benchmarks.sample_files import (
     ROWS,
     SAMPLES,
     colors,
+    glb,
+    npy,
     pcd_binary,
     pcd_compressed,
     pcd_head,
     surface,
+    vtk,
 )
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io import collect, read_scan
 from scanweld.io.raw import POSE_NOTE
 from scanweld.io.scans import read_scans
+from scanweld.io.unpack import SMALL
 
 SEEN = np.isfinite(surface()).all(axis=2)
 
@@ -128,6 +135,84 @@ def test_names_of_several_scans_do_not_clash(tmp_path: Path):
     assert [file.part for file in files] == [0, 1, 0]
 
 
+@pytest.mark.parametrize("name", ["organised.ply", "packed.pcd.gz", "grid.npy", "grid.npz"])
+def test_grids_of_other_formats(name: str, tmp_path: Path):
+    path = write(tmp_path, name)
+    scan = read_scan(path)
+    assert_is_surface(scan)
+    assert scan.name == name.partition(".")[0] == collect([path])[0].name
+    if name.endswith((".gz", ".npz")):
+        assert_has_colors(scan)
+
+
+@pytest.mark.parametrize("name", ["ascii.vtk", "binary.vtk"])
+def test_vtk_structured_grid(name: str, tmp_path: Path):
+    scan = read_scan(write(tmp_path, name))
+    assert scan.grid is not None and scan.colors is not None and scan.notes == ()
+    np.testing.assert_allclose(scan.points[scan.grid], np.nan_to_num(surface()), rtol=1e-7)
+    np.testing.assert_array_equal(scan.colors, colors())
+
+
+def test_vtk_polygons_of_old_and_new_versions(tmp_path: Path):
+    head = "# vtk DataFile Version 3.0\n\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n"
+    head += "0 0 0 1 0 0 1 1 0 0 1 0\nVERTICES 1 2\n1 0\n"
+    tail = "POINT_DATA 4\nNORMALS n float\n" + "0 0 1 " * 4 + "\nTENSORS t float\n1 2\n"
+    for version, cells in (
+        ("3.0", "POLYGONS 2 9\n4 0 1 2 3\n3 0 1 2\n"),
+        (
+            "5.1",
+            "POLYGONS 3 7\nOFFSETS vtktypeint64\n0 4 7\nCONNECTIVITY vtktypeint64\n0 1 2 3 0 1 2\n",
+        ),
+    ):
+        if version == "5.1":
+            head = head.replace("VERTICES 1 2\n1 0\n", "")
+        scan = read_scan(write(tmp_path, "a.vtk", (head + cells + tail).encode()))
+        assert scan.faces is not None and scan.normals is not None
+        np.testing.assert_array_equal(scan.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2]])
+        np.testing.assert_array_equal(scan.normals, [[0, 0, 1]] * 4)
+        assert scan.notes == ("left out from TENSORS on",)
+
+
+def test_glb_nodes_move_their_meshes_exactly(tmp_path: Path):
+    scan = read_scan(write(tmp_path, "nodes.glb"))
+    origin = np.array([4e6, 5e5, 0.25])
+    square = 2 * np.array([[0, 0, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0]])
+    np.testing.assert_allclose(scan.points[:4] - origin, square, atol=1e-9)
+    np.testing.assert_array_equal(scan.points[4:] - origin, [[1, 0, 7], [0, 1, 7]])
+    np.testing.assert_array_equal(scan.faces, [[0, 1, 2], [0, 2, 3]])
+
+
+def test_ply_element_camera_gives_the_place_of_the_sensor(tmp_path: Path):
+    names = ["view_px", "view_py", "view_pz"]
+    names += [f"{axis}_axis{part}" for axis in "xyz" for part in "xyz"]
+    head = "ply\nformat ascii 1.0\nelement vertex 4\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz") + "element camera 1\n"
+    head += "".join(f"property float {name}\n" for name in names) + "end_header\n"
+    points = "0 0 5\n1 0 5\n0 1 5\n1 1 6\n"
+    for numbers, is_given in (("0.5 0.5 0", True), ("0 0 0", False), ("0.5 0.5 5.2", False)):
+        data = head + points + numbers + " 1 0 0 0 1 0 0 0 1\n"
+        scan = read_scan(write(tmp_path, "a.ply", data.encode()))
+        assert (scan.viewpoint is Viewpoint.GIVEN) is is_given
+    assert "lies among the points" in scan.notes[0]
+
+
+def test_obj_with_colors_on_some_vertices_is_read_without(tmp_path: Path):
+    scan = read_scan(write(tmp_path, "a.obj", b"v 0 0 1 1 0 0\nv 1 2 3\nv 4 5 6 0 0 1\n"))
+    np.testing.assert_array_equal(scan.points, [[0, 0, 1], [1, 2, 3], [4, 5, 6]])
+    assert scan.colors is None and "colours on some" in scan.notes[0]
+
+
+def test_bombs_are_refused(tmp_path: Path):
+    bomb = gzip.compress(bytes(SMALL + 1))
+    with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
+        read_scan(write(tmp_path, "a.ply.gz", bomb))
+    stream = BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("points.npy", bytes(SMALL + 1))
+    with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
+        read_scan(write(tmp_path, "a.npz", stream.getvalue()))
+
+
 @pytest.mark.parametrize(
     ("name", "data", "says"),
     [
@@ -146,6 +231,21 @@ def test_names_of_several_scans_do_not_clash(tmp_path: Path):
         # The first thing compressed is a copy of what is not there.
         ("a.pcd", re.sub(rb"(?s)(?<=compressed\n.{8}).", b"\xe0", pcd_compressed()), "broken"),
         ("a.pcd", pcd_binary().replace(b"WIDTH 7", b"WIDTH 0"), "WIDTH x HEIGHT"),
+        ("a.xyz.gz", gzip.compress(b"0 0 0\n")[:-3], "cannot be unpacked"),
+        ("a.gz", gzip.compress(b"0 0 0\n"), "unknown format"),
+        ("a.npy", npy(surface())[:-1], "truncated"),
+        ("a.npy", npy(np.zeros((4, 5))), r"shape \(4, 5\)"),
+        ("a.npy", npy(np.array([{}])), "save the points as numbers"),
+        ("a.npz", b"PK\3\4", "cannot be unpacked"),
+        ("a.vtk", b"hello", "not a VTK legacy file"),
+        ("a.vtk", vtk(is_binary=True)[:-9], "too early"),
+        ("a.vtk", vtk(is_binary=False)[:-90], "too early"),
+        ("a.vtk", vtk(is_binary=False).replace(b"STRUCTURED_GRID", b"FIELD"), "POLYDATA"),
+        ("a.glb", b"glTF", "not a GLB file"),
+        ("a.glb", glb()[:-9], "truncated"),
+        ("a.glb", glb().replace(b'"count": 4', b'"count": 9'), "smaller than it says"),
+        ("a.glb", glb().replace(b"[0, 2]", b"[0, 1]"), "no tree"),
+        ("a.glb", glb().replace(b'"mode": 0', b'"mode": 5'), "strips"),
         ("a.ptx", b"3\n2\n0 0 0\n", "no scan of a PTX file begins here"),
         ("a.ptx", SAMPLES["two.ptx"]()[:-900], "scan 2 has"),
         ("a.ptx", SAMPLES["two.ptx"]() + b"7\n", "line 105: no scan"),

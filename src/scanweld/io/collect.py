@@ -121,10 +121,10 @@ def _scans_among(candidates: list[Path], where: str, named: str = "") -> list[Pa
 
 
 def _unique_names(paths: list[Path]) -> list[str]:
-    stems = [path.stem for path in paths]
+    stems = [stem_of(path) for path in paths]
     if len(set(stems)) == len(stems):
         return stems
     parent = os.path.commonpath([path.parent for path in paths])
     relative = [PurePath(os.path.relpath(path, parent)) for path in paths]
-    short = [path.with_suffix("").as_posix() for path in relative]
+    short = [path.with_name(stem_of(path)).as_posix() for path in relative]
     return short if len(set(short)) == len(short) else [path.as_posix() for path in relative]

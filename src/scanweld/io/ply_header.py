@@ -94,7 +94,8 @@ def parse_header(path: Path, data: bytes) -> PlyHeader:
         elif keyword == "property":
             if not elements:
                 raise ReadError(f"{path}: '{line}' stands before any element; export the file anew")
-            elements[-1][2].append(_property(path, line, words))
+            known = elements[-1][2]
+            known.append(_property(path, line, words, {prop.name for prop in known}))
         elif keyword:
             logger.debug("%s: header line %r skipped", path, line)
     if form not in FORMATS:
@@ -140,10 +141,13 @@ def _element(path: Path, line: str, words: list[str]) -> tuple[str, int, list[Pl
     return words[0], int(words[1]), []
 
 
-def _property(path: Path, line: str, words: list[str]) -> PlyProperty:
+def _property(path: Path, line: str, words: list[str], taken: set[str]) -> PlyProperty:
+    """A property, its name in small letters unless one of the element's is called so."""
+    name = words[-1].lower() if words else ""
+    name = words[-1] if name in taken else name
     types = [SCALAR_TYPES.get(word) for word in words[:-1]]
     if len(words) == 2 and types[0] is not None:
-        return PlyProperty(name=words[1], type=types[0])
+        return PlyProperty(name=name, type=types[0])
     if len(words) == 4 and words[0] == "list" and types[1] is not None and types[2] is not None:
-        return PlyProperty(name=words[3], type=types[2], count_type=types[1])
+        return PlyProperty(name=name, type=types[2], count_type=types[1])
     raise ReadError(f"{path}: '{line}' is not a property of a known type; export the file anew")

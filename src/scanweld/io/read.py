@@ -8,7 +8,13 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.raw import RawScan, to_mesh, to_scan
 from scanweld.io.scan_formats.records import Keeps, Part
-from scanweld.io.scan_formats.registry import format_of, formats_by_suffix, stem_of
+from scanweld.io.scan_formats.registry import (
+    format_of,
+    formats_by_suffix,
+    is_gzipped,
+    stem_of,
+)
+from scanweld.io.unpack import gunzip
 
 
 def read_scan(path: Path | str, name: str | None = None, *, part: int = 0) -> RangeScan:
@@ -69,7 +75,7 @@ def _parts(path: Path) -> Sequence[Part]:
         raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     if not data:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
-    found = form.read(path, data)
+    found = form.read(path, gunzip(path, data) if is_gzipped(path) else data)
     parts = [Part(read=lambda: found)] if isinstance(found, RawScan) else found
     if not parts:
         raise ReadError(f"{path}: holds no scans; leave it out")

@@ -9,6 +9,26 @@ _MOST_BEHIND = 0.01
 """Share of the points, strays, that may lie behind a sensor which is said to have seen them."""
 
 
+def viewpoint_told(
+    points: FloatArray, place: FloatArray, is_unturned: bool, what: str
+) -> tuple[Pose | None, tuple[str, ...]]:
+    """The sensor where a file says that it stood, if the points lie before it, and notes on it.
+
+    Args:
+        points: (N, 3).
+        place: (3,) in the points' frame.
+        is_unturned: Whether its axes are those of the frame: at the origin this is what programs
+            write that do not know.
+        what: Where in the file it is told, for the note.
+    """
+    if not np.isfinite(place).all() or (is_unturned and not place.any()):
+        return None, ()
+    pose = seen_from(points, place)
+    if pose is None:
+        return None, (f"the place of its {what} lies among the points, so it was left out",)
+    return pose, (f"seen from the place of its {what}, in the direction of the points",)
+
+
 def seen_from(points: FloatArray, place: FloatArray) -> Pose | None:
     """A sensor at a place (3,) that looks to the middle of points (N, 3); None if it cannot.
 

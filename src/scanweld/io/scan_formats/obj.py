@@ -31,11 +31,16 @@ def read_obj(path: Path, data: bytes) -> RawScan:
     sizes = sorted({len(vertex) for vertex in vertices})
     if not sizes:
         raise ReadError(f"{path}: holds no vertices; export the scan as a mesh or as points")
+    faces = fan_faces(counts, corners)
+    if sizes in ([3, 6], [4, 7]):
+        note = "colours on some of its vertices only, so they were left out"
+        points = np.array([vertex[:3] for vertex in vertices])
+        return RawScan(points=points, faces=faces, notes=(note,))
     if len(sizes) > 1 or sizes[0] not in (3, 4, 6, 7):
         raise ReadError(f"{path}: its vertices have {sizes} numbers, not all 3; export it anew")
     table = np.array(vertices)
     colors = to_bytes(table[:, -3:], "f8") if sizes[0] >= 6 else None
-    return RawScan(points=table[:, :3], faces=fan_faces(counts, corners), colors=colors)
+    return RawScan(points=table[:, :3], faces=faces, colors=colors)
 
 
 def _obj_index(word: bytes, num_vertices: int) -> int:

@@ -16,15 +16,12 @@ from scanweld.io.pcd_header import PcdField, PcdHeader, parse_pcd_header
 from scanweld.io.raw import RawScan, full_grid, side_by_side, to_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text import parse_numbers
-from scanweld.io.viewed_from import seen_from
+from scanweld.io.viewed_from import viewpoint_told
 
 _NORMALS = (("normal_x", "normal_y", "normal_z"), ("nx", "ny", "nz"))
 _COLORS = (("r", "g", "b"), ("red", "green", "blue"))
 _PACKED = ("rgb", "rgba")
 _PADDING = "_"
-_NOT_TOLD = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-"""The viewpoint that programs write when they know of none."""
-
 Columns = dict[str, NDArray]
 
 
@@ -44,7 +41,7 @@ def read_pcd(path: Path, data: bytes) -> RawScan:
         raise ReadError(f"{path}: its points lack x, y or z; export the scan with its points")
     colors, used = _colors(columns)
     grid = full_grid(header.height, header.width) if header.height > 1 else None
-    pose, note = (None, "") if grid is not None else _viewpoint(header, points)
+    pose, notes = (None, ()) if grid is not None else _viewpoint(header, points)
     known = {"x", "y", "z", "intensity", _PADDING, *used, *(n for names in _NORMALS for n in names)}
     left_out = [field.name for field in header.fields if field.name not in known]
     normals = next(
@@ -57,10 +54,7 @@ def read_pcd(path: Path, data: bytes) -> RawScan:
         colors=colors,
         intensity=_intensity(columns),
         scan_from_sensor=pose,
-        notes=(
-            *((f"fields left out: {', '.join(left_out)}",) if left_out else ()),
-            *((note,) if note else ()),
-        ),
+        notes=(*((f"fields left out: {', '.join(left_out)}",) if left_out else ()), *notes),
     )
 
 
@@ -185,15 +179,15 @@ def _intensity(columns: Columns) -> ByteArray | None:
     return None if values is None else to_bytes(values, values.dtype.str[1:])
 
 
-def _viewpoint(header: PcdHeader, points: FloatArray) -> tuple[Pose | None, str]:
-    """Where the sensor stood in the points' frame, and a note on it."""
-    told = header.viewpoint
-    if not told or told == _NOT_TOLD or not np.isfinite(told).all():
-        return None, ""
-    pose = seen_from(points, np.array(told[:3]))
-    if pose is None:
-        return None, "its VIEWPOINT lies among the points, so it was left out"
-    return pose, "seen from the place of its VIEWPOINT, in the direction of the points"
+def _viewpoint(header: PcdHeader, points: FloatArray) -> tuple[Pose | None, tuple[str, ...]]:
+    """Where the sensor stood in the points' frame, and notes on it.
+
+    Only the place is believed: programs differ in which way the sensor looks.
+    """
+    if not header.viewpoint:
+        return None, ()
+    place, turn = np.array(header.viewpoint[:3]), header.viewpoint[3:]
+    return viewpoint_told(points, place, turn == (1.0, 0.0, 0.0, 0.0), "VIEWPOINT")
 
 
 FORMAT = ScanFormat(

@@ -29,13 +29,18 @@ def _modules() -> tuple[ModuleType, ...]:
 
 
 def suffix_of(path: PurePath) -> str:
-    """The suffix that tells a file's format, in lower case."""
-    return path.suffix.lower()
+    """The suffix that tells a file's format, in lower case: that before a ``.gz``."""
+    return (PurePath(path.stem) if is_gzipped(path) else path).suffix.lower()
 
 
 def stem_of(path: PurePath) -> str:
-    """The file's name without that suffix."""
-    return path.stem
+    """The file's name without that suffix, and without ``.gz``."""
+    return PurePath(path.stem).stem if is_gzipped(path) else path.stem
+
+
+def is_gzipped(path: PurePath) -> bool:
+    """Whether a file is packed as a whole, by its name."""
+    return path.suffix.lower() == ".gz"
 
 
 def format_of(path: PurePath) -> ScanFormat | None:
