@@ -8,6 +8,8 @@ import json
 import struct
 from collections.abc import Callable
 from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,6 +197,40 @@ def glb() -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
+def e57() -> bytes:
+    """Two scans as pye57 writes them, the second with a pose."""
+    import pye57
+
+    rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
+    points, seen = surface().reshape(-1, 3), np.isfinite(surface()).all(axis=2).ravel()
+    table = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points[seen].T, strict=True))
+    table |= {"rowIndex": rows[seen], "columnIndex": columns[seen]}
+    table |= zip(("colorRed", "colorGreen", "colorBlue"), colors()[seen].T, strict=True)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.e57"
+        file = pye57.E57(str(path), mode="w")
+        half = np.array([0.5**0.5, 0, 0, 0.5**0.5])
+        file.write_scan_raw(table, name="left")
+        file.write_scan_raw(table, name="right", rotation=half, translation=GROUND[:3, 3])
+        file.close()
+        return path.read_bytes()
+
+
+def las(*, is_packed: bool) -> bytes:
+    """Points as laspy writes them, at map coordinates in hundredths."""
+    import laspy
+
+    header = laspy.LasHeader(point_format=2, version="1.2")
+    header.offsets, header.scales = np.array([4e6, 5e5, 0]), np.full(3, 0.01)
+    found = laspy.LasData(header)
+    found.xyz = np.nan_to_num(np.round(surface(), 2)).reshape(-1, 3) + header.offsets
+    for name, channel in zip(("red", "green", "blue"), colors().T, strict=True):
+        setattr(found, name, channel.astype(np.uint16) * 257)
+    stream = BytesIO()
+    found.write(stream, do_compress=is_packed)
+    return stream.getvalue()
+
+
 SAMPLES: dict[str, Callable[[], bytes]] = {
     "ascii.pcd": pcd_ascii,
     "binary.pcd": pcd_binary,
@@ -208,4 +244,10 @@ SAMPLES: dict[str, Callable[[], bytes]] = {
     "binary.vtk": lambda: vtk(is_binary=True),
     "nodes.glb": glb,
 }
-"""Makers of the files by their names."""
+"""Makers of the files by their names,"""
+WITH_LIBRARIES: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "two.e57": ("pye57", e57),
+    "points.las": ("laspy", lambda: las(is_packed=False)),
+    "points.laz": ("lazrs", lambda: las(is_packed=True)),
+}
+"""and of those that a library writes: its name, and the maker."""

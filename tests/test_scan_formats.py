@@ -2,12 +2,15 @@
 
 import gzip
 import re
+import sys
 import zipfile
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+import trimesh.visual
 
 from benchmarks.sample_files import (
     COLUMNS,
@@ -15,6 +18,7 @@ from benchmarks.sample_files import (
     HOLES,
     ROWS,
     SAMPLES,
+    WITH_LIBRARIES,
     colors,
     glb,
     npy,
@@ -202,6 +206,47 @@ def test_obj_with_colors_on_some_vertices_is_read_without(tmp_path: Path):
     assert scan.colors is None and "colours on some" in scan.notes[0]
 
 
+def test_e57_gives_several_scans_by_their_names(tmp_path: Path):
+    library, make = WITH_LIBRARIES["two.e57"]
+    pytest.importorskip(library)
+    path = write(tmp_path, "two.e57", make())
+    left, right = read_scans(path)
+    assert (left.name, right.name) == ("left", "right")
+    for scan in (left, right):
+        assert scan.grid is not None
+        np.testing.assert_array_equal(scan.grid >= 0, SEEN)
+        np.testing.assert_array_equal(scan.points[scan.grid[SEEN]], surface()[SEEN])
+        assert_has_colors(scan)
+    assert right.world_from_scan is not None and right.notes == (POSE_NOTE,)
+    np.testing.assert_allclose(right.world_from_scan.matrix(), GROUND, atol=1e-12)
+    with pytest.raises(ReadError, match="is not read packed"):
+        read_scan(write(tmp_path, "a.e57.gz", gzip.compress(make())))
+    for data in (make()[:-600], b"hello", make()[:3000] + bytes(9) + make()[3009:]):
+        with pytest.raises(ReadError, match="not an E57 file, or a broken one"):
+            for file in collect([write(tmp_path, "b.e57", data)]):
+                file.read()
+
+
+@pytest.mark.parametrize("name", ["points.las", "points.laz"])
+def test_las_keeps_map_coordinates_and_colors(name: str, tmp_path: Path):
+    library, make = WITH_LIBRARIES[name]
+    pytest.importorskip(library)
+    scan = read_scan(write(tmp_path, name, make()))
+    told = np.nan_to_num(np.round(surface(), 2)).reshape(-1, 3) + np.array([4e6, 5e5, 0])
+    np.testing.assert_allclose(scan.points, told, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(scan.colors, colors())
+    for data in (make()[:-30], b"hello", make()[:200]):
+        with pytest.raises(ReadError):
+            read_scan(write(tmp_path, name, data))
+
+
+def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for library, name, extra in (("pye57", "a.e57", "e57"), ("laspy", "a.laz", "las")):
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(ReadError, match=rf"pip install 'scanweld\[{extra}"):
+            read_scan(write(tmp_path, name, b"anything"))
+
+
 def test_bombs_are_refused(tmp_path: Path):
     bomb = gzip.compress(bytes(SMALL + 1))
     with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
@@ -255,3 +300,54 @@ def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_p
     with pytest.raises(ReadError, match=says) as caught:
         read_scan(write(tmp_path, name, data))
     assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
+
+
+def test_what_open3d_writes_as_pcd_is_read(tmp_path: Path):
+    o3d = pytest.importorskip("open3d")
+    rng = np.random.default_rng(4)
+    points, normals = rng.random((50, 3)), np.tile([0.6, 0, 0.8], (50, 1))
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.colors = o3d.utility.Vector3dVector(rng.integers(0, 256, (50, 3)) / 255)
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    path = tmp_path / "a.pcd"
+    for options in ({}, {"write_ascii": True}, {"compressed": True}):
+        o3d.io.write_point_cloud(str(path), cloud, **options)
+        scan = read_scan(path)
+        assert scan.normals is not None and scan.notes == ()
+        np.testing.assert_allclose(scan.points, points, atol=1e-7)
+        np.testing.assert_allclose(scan.normals, normals, atol=1e-7)
+        np.testing.assert_array_equal(scan.colors, np.rint(255 * np.asarray(cloud.colors)))
+
+
+def test_what_trimesh_writes_as_glb_is_read(tmp_path: Path):
+    rng, path = np.random.default_rng(4), tmp_path / "a.glb"
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    shades = rng.integers(0, 256, (len(ball.vertices), 4)).astype(np.uint8)
+    ball.visual = trimesh.visual.ColorVisuals(ball, vertex_colors=shades)
+    cloud, turn = rng.random((9, 3)), trimesh.transformations.rotation_matrix(1, [1, 2, 3])
+    scene = trimesh.Scene()
+    scene.add_geometry(ball, transform=turn)
+    scene.add_geometry(trimesh.PointCloud(cloud), transform=turn.T)
+    scene.export(path)
+    scan = read_scan(path)
+    balls, clouds = (
+        trimesh.transform_points(p, t) for p, t in ((ball.vertices, turn), (cloud, turn.T))
+    )
+    np.testing.assert_allclose(np.sort(scan.points, 0), np.sort([*balls, *clouds], 0), atol=1e-6)
+    assert "colours on some of its meshes only" in scan.notes[0]
+    ball.export(path)
+    np.testing.assert_array_equal(read_scan(path).colors, shades[:, :3])
+
+
+@pytest.mark.parametrize("form", ["vtk42", "vtk51"])
+@pytest.mark.parametrize("is_binary", [True, False])
+def test_what_meshio_writes_as_vtk_is_read(form: str, is_binary: bool, tmp_path: Path):
+    meshio = pytest.importorskip("meshio")
+    rng, path = np.random.default_rng(4), tmp_path / "a.vtk"
+    points, faces = rng.random((50, 3)), rng.integers(0, 50, (30, 3))
+    data = {"a": rng.random(50), "v": rng.random((50, 3))}
+    mesh = meshio.Mesh(points, [("triangle", faces)], point_data=data)
+    meshio.write(path, mesh, file_format=form, binary=is_binary)
+    scan = read_scan(path)
+    np.testing.assert_array_equal(scan.points, points)
+    np.testing.assert_array_equal(scan.faces, faces)

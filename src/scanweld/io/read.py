@@ -13,6 +13,7 @@ from scanweld.io.scan_formats.registry import (
     formats_by_suffix,
     is_gzipped,
     stem_of,
+    suffix_of,
 )
 from scanweld.io.unpack import gunzip
 
@@ -69,11 +70,14 @@ def _parts(path: Path) -> Sequence[Part]:
     form = format_of(path)
     if form is None:
         raise unknown_format(path)
+    if form.opens_path and is_gzipped(path):
+        raise ReadError(f"{path}: {suffix_of(path)} is not read packed; unpack it with gunzip")
     try:
-        data = path.read_bytes()
+        data = b"" if form.opens_path else path.read_bytes()
+        is_empty = not path.stat().st_size
     except OSError as error:
         raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    if not data:
+    if is_empty:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
     found = form.read(path, gunzip(path, data) if is_gzipped(path) else data)
     parts = [Part(read=lambda: found)] if isinstance(found, RawScan) else found

@@ -106,9 +106,14 @@ def _normals(values: NDArray | None, linear: FloatArray) -> FloatArray | None:
 
 
 def _colors(values: NDArray | None) -> ByteArray | None:
-    """Red, green, blue (N, 3) for the screen of glTF's colours, which are in linear light."""
+    """Red, green, blue (N, 3) for the screen of glTF's colours, which are in linear light.
+
+    Bytes, too coarse for that, are colours of the screen: trimesh and apps of phones write these.
+    """
     if values is None:
         return None
+    if values.dtype == np.uint8:
+        return values[:, :3].copy()
     if values.dtype.kind == "u":
         values = values / np.iinfo(values.dtype).max
     light = np.clip(np.nan_to_num(values[:, :3]), 0.0, 1.0)

@@ -52,6 +52,7 @@ class ScanFormat:
         only_named: Those of the suffixes that are more often no scans: such a file must be named,
             it is left alone in a folder.
         extra: Name of the optional dependencies that the reader needs.
+        opens_path: Whether the reader opens the path itself; it is then given no bytes.
     """
 
     suffixes: tuple[str, ...]
@@ -59,6 +60,7 @@ class ScanFormat:
     keeps: tuple[Keeps, ...] = ()
     only_named: tuple[str, ...] = ()
     extra: str = ""
+    opens_path: bool = False
 
 
 def needed(path: Path, library: str, extra: str) -> ModuleType:

@@ -1,0 +1,65 @@
+"""LAS and LAZ of ASPRS: points, with colours or intensity."""
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from scanweld.errors import ReadError
+from scanweld.geometry.arrays import ByteArray
+from scanweld.io.raw import RawScan, side_by_side, to_bytes
+from scanweld.io.scan_formats.records import Keeps, ScanFormat, needed
+from scanweld.io.unpack import MOST_EXPANSION, SMALL
+
+
+def read_las(path: Path, data: bytes) -> RawScan:
+    """The points of a LAS or LAZ file, scaled and shifted as it says, in double precision.
+
+    Raises:
+        ReadError: If laspy is not installed, or the file is broken.
+    """
+    laspy = needed(path, "laspy", "las")
+    try:
+        with laspy.open(BytesIO(data)) as reader:
+            header = reader.header
+            size = header.point_count * header.point_format.size
+            if size > max(SMALL, MOST_EXPANSION * len(data)):
+                raise ReadError(
+                    f"{path}: says {header.point_count} points, more than it can hold; copy it "
+                    "again"
+                )
+            found = reader.read()
+        points = side_by_side([found.x, found.y, found.z])
+        names = set(found.point_format.dimension_names)
+        colors = _colors(found) if {"red", "green", "blue"} <= names else None
+        intensity = _shades(np.asarray(found.intensity)) if "intensity" in names else None
+    except ReadError:
+        raise
+    # What lies below laspy is written in Rust: its panics are no Exception.
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt | SystemExit):
+            raise
+        told = " ".join(str(error).split())[:100]
+        raise ReadError(
+            f"{path}: not a LAS or LAZ file, or a broken one ({told}); copy it again or export "
+            "it anew"
+        ) from error
+    if len(points) != header.point_count:
+        raise ReadError(
+            f"{path}: holds {len(points)} points but says {header.point_count} (truncated, or a "
+            "wrong count); copy it again"
+        )
+    return RawScan(points=points, colors=colors, intensity=intensity)
+
+
+def _colors(found: object) -> ByteArray | None:
+    channels = [np.asarray(getattr(found, name)) for name in ("red", "green", "blue")]
+    return to_bytes(np.stack(channels, axis=1), "u2")
+
+
+def _shades(values: np.ndarray) -> ByteArray | None:
+    """Intensities as grey; none where all are the same, as where nothing was measured."""
+    return to_bytes(values, "u2") if len(values) and values.min() < values.max() else None
+
+
+FORMAT = ScanFormat(suffixes=(".las", ".laz"), read=read_las, keeps=(Keeps.COLORS,), extra="las")
