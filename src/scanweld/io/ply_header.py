@@ -17,6 +17,7 @@ SCALAR_TYPES = {
 }
 """Both spellings of every scalar type -> NumPy's code without the byte order."""
 _FIRST_LINE = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
+_COUNT = re.compile(r"[0-9]{1,15}")
 FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 
 
@@ -136,7 +137,7 @@ def _header_lines(path: Path, data: bytes) -> tuple[list[str], int]:
 
 
 def _element(path: Path, line: str, words: list[str]) -> tuple[str, int, list[PlyProperty]]:
-    if len(words) != 2 or not words[1].isdecimal():
+    if len(words) != 2 or not _COUNT.fullmatch(words[1]):
         raise ReadError(f"{path}: '{line}' is not 'element NAME COUNT'; export the file anew")
     return words[0], int(words[1]), []
 

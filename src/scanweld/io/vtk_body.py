@@ -18,6 +18,8 @@ _TYPES = {
     **{"float": "f4", "double": "f8", "vtkidtype": "i4", "vtktypeint64": "i8"},
 }
 _LINE = re.compile(rb"[ \t]*([^\r\n]*)(\r\n|\n|\r|$)")
+_LARGEST_INDEX = 2**53
+"""Above this a double, as which the numbers of ASCII files are read, is not exact."""
 _COUNT = re.compile(r"\d{1,12}")
 
 
@@ -104,20 +106,27 @@ class VtkBody:
         begin = self.at
         words = self.line()
         if words[:1] == ["OFFSETS"] and len(words) == 2:
-            ends = self.values(count, words[1]).astype(np.int64)
+            ends = self._integers(count, words[1])
             words = self.line()
             if words[:1] != ["CONNECTIVITY"] or len(words) != 2:
                 raise self.broken("OFFSETS without CONNECTIVITY")
-            corners = self.values(size, words[1]).astype(np.int64)
+            corners = self._integers(size, words[1])
             if not count or ends[0] != 0 or ends[-1] != size or (np.diff(ends) < 0).any():
                 raise self.broken("the OFFSETS of its cells are wrong")
             return np.diff(ends), corners
         self.at = begin
-        values = self.values(size, "int").astype(np.int64)
+        values = self._integers(size, "int")
         counts, is_corner = np.zeros(min(count, size), np.int64), np.ones(size, np.bool_)
         if len(counts) != count or not _split_cells(values, counts, is_corner):
             raise self.broken("its cells do not fill their list")
         return counts, values[is_corner]
+
+    def _integers(self, count: int, kind: str) -> IntArray:
+        """The same for whole numbers."""
+        values = self.values(count, kind)
+        if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST_INDEX).all():
+            raise self.broken("its cells are not made of whole numbers")
+        return values.astype(np.int64)
 
     def broken(self, what: str) -> ReadError:
         """What is said of a broken file."""

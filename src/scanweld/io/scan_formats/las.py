@@ -19,6 +19,7 @@ def read_las(path: Path, data: bytes) -> RawScan:
         ReadError: If laspy is not installed, or the file is broken.
     """
     laspy = needed(path, "laspy", "las")
+    _check_records(path, data)
     try:
         with laspy.open(BytesIO(data)) as reader:
             header = reader.header
@@ -50,6 +51,23 @@ def read_las(path: Path, data: bytes) -> RawScan:
             "wrong count); copy it again"
         )
     return RawScan(points=points, colors=colors, intensity=intensity)
+
+
+def _check_records(path: Path, data: bytes) -> None:
+    """Refuse a file that says it has more records than it has room for: laspy would read on.
+
+    Offsets as in the LAS specification, 1.2 to 1.4.
+    """
+    count, num_extended = int.from_bytes(data[100:104], "little"), 0
+    if len(data) >= 247 and data[25] >= 4:
+        num_extended = int.from_bytes(data[243:247], "little")
+    start = int.from_bytes(data[96:100], "little")
+    is_cut = len(data) < 227 or not data.startswith(b"LASF") or start > len(data)
+    if is_cut or 54 * count + 60 * num_extended > len(data):
+        raise ReadError(
+            f"{path}: not a LAS or LAZ file, or a broken one (its records are longer than it); "
+            "copy it again or export it anew"
+        )
 
 
 def _colors(found: object) -> ByteArray | None:

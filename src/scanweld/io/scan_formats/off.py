@@ -12,6 +12,7 @@ from scanweld.io.raw import RawScan, to_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text import is_number
 
+_COUNT = re.compile(rb"[0-9]{1,15}")
 _OFF_MAGIC = re.compile(rb"(C?)(N?)OFF\b", re.IGNORECASE)
 
 
@@ -27,7 +28,7 @@ def read_off(path: Path, data: bytes) -> RawScan:
     if kind is None:
         raise ReadError(f"{path}: not an OFF file (it does not begin with 'OFF'); leave it out")
     number, words = (0, magic[1:]) if len(magic) > 1 else next(lines, (0, []))
-    if len(words) < 2 or not all(word.isdigit() for word in words):
+    if len(words) < 2 or not all(map(_COUNT.fullmatch, words)):
         raise broken_line(path, number, words)
     rows = list(lines)
     num_vertices, num_faces = int(words[0]), int(words[1])
@@ -67,9 +68,9 @@ def _off_faces(path: Path, rows: list[tuple[int, list[bytes]]]) -> IntArray | No
     counts: list[int] = []
     corners: list[int] = []
     for number, words in rows:
-        size = int(words[0]) if words[0].isdigit() else len(words)
+        size = int(words[0]) if _COUNT.fullmatch(words[0]) else len(words)
         indices = words[1 : 1 + size]  # behind them may stand a colour
-        if len(indices) < size or not all(word.isdigit() for word in indices):
+        if len(indices) < size or not all(map(_COUNT.fullmatch, indices)):
             raise broken_line(path, number, words)
         counts.append(size)
         corners += map(int, indices)

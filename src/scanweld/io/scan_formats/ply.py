@@ -150,7 +150,7 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
     if cells is None:
         raise ReadError(f"{header.path}: its range_grid has no list vertex_indices; export it anew")
     shape = (header.info.get("num_rows", ""), header.info.get("num_cols", ""))
-    if not all(text.isdecimal() for text in shape):
+    if not all(_SHORT_NUMBER.fullmatch(text) for text in shape):
         logger.warning("%s: range_grid without num_rows and num_cols, left out", header.path)
         return None, ("range grid of unknown shape left out",)
     rows, columns = (int(text) for text in shape)
