@@ -12,6 +12,7 @@ import pytest
 import trimesh
 import trimesh.visual
 
+from benchmarks import fuzz
 from benchmarks.sample_files import (
     COLUMNS,
     GROUND,
@@ -351,3 +352,14 @@ def test_what_meshio_writes_as_vtk_is_read(form: str, is_binary: bool, tmp_path:
     scan = read_scan(path)
     np.testing.assert_array_equal(scan.points, points)
     np.testing.assert_array_equal(scan.faces, faces)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", sorted(set(fuzz.samples()) - {"a.xyz"}))
+def test_mutated_files_are_read_or_refused(name: str, tmp_path: Path):
+    data = fuzz.samples()[name]()
+    for seed in range(50):
+        fuzz.read_all(
+            write(tmp_path, name, fuzz.broken_file(name, data, np.random.default_rng(seed)))
+        )
+    assert fuzz.read_all(write(tmp_path, name, data))

@@ -63,11 +63,26 @@ def _check_records(path: Path, data: bytes) -> None:
         num_extended = int.from_bytes(data[243:247], "little")
     start = int.from_bytes(data[96:100], "little")
     is_cut = len(data) < 227 or not data.startswith(b"LASF") or start > len(data)
-    if is_cut or 54 * count + 60 * num_extended > len(data):
+    if is_cut or 54 * count + 60 * num_extended > len(data) or _num_chunks(data, start) > len(data):
         raise ReadError(
             f"{path}: not a LAS or LAZ file, or a broken one (its records are longer than it); "
             "copy it again or export it anew"
         )
+
+
+def _num_chunks(data: bytes, start: int) -> int:
+    """Packed pieces that a LAZ file says it has; more than its bytes if it cannot say where.
+
+    The points begin with the place of the table of pieces, or it stands in the last eight bytes.
+    """
+    if not data[104] & 128:
+        return 0
+    table = int.from_bytes(data[start : start + 8], "little", signed=True)
+    if table == -1:
+        table = int.from_bytes(data[-8:], "little", signed=True)
+    if not start + 8 <= table <= len(data) - 8:
+        return len(data) + 1
+    return int.from_bytes(data[table + 4 : table + 8], "little")
 
 
 def _colors(found: object) -> ByteArray | None:
