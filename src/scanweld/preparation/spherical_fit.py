@@ -38,8 +38,9 @@ def fit_spherical(scan: RangeScan) -> tuple[CameraFit, IntArray] | None:
     grid = _begun_elsewhere(scan.grid, step)
     rows, columns = np.nonzero(grid >= 0)
     points = scan.points[grid[rows, columns]]
-    ahead = np.arctan2(points[:, 1].mean(), points[:, 0].mean())
-    azimuth = _wrapped(np.arctan2(points[:, 1], points[:, 0]) - ahead)
+    azimuth = _unwrapped(np.arctan2(points[:, 1], points[:, 0]), step * columns.astype(np.float64))
+    ahead = float(azimuth.mean())
+    azimuth = azimuth - ahead
     elevation = np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))
     u, v = _line(azimuth, columns), _line(elevation, rows)
     if u is None or v is None:
@@ -106,6 +107,13 @@ def _line(angle: FloatArray, cells: IntArray) -> tuple[float, float, float] | No
     offset = float(cells.mean() - slope * angle.mean())
     rms = float(np.sqrt(((slope * angle + offset - cells) ** 2).mean()))
     return (slope, offset, rms) if slope else None
+
+
+def _unwrapped(angle: FloatArray, expected: FloatArray) -> FloatArray:
+    """Angles, up to whole turns, as they are expected up to a common turn."""
+    off = angle - expected
+    common = np.arctan2(np.sin(off).mean(), np.cos(off).mean())
+    return expected + common + _wrapped(off - common)
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:
