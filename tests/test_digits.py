@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from scanweld.errors import ReadError
 from scanweld.io import read_scan
-from scanweld.io.mesh_formats import _merged
+from scanweld.io.scan_formats.stl import _merged
 from scanweld.io.text import parse_numbers
 
 HEADER = "ply\nformat ascii 1.0\n{}element vertex {}\n"
