@@ -37,6 +37,7 @@ from scanweld.io.scans import read_scans
 from scanweld.io.unpack import SMALL
 
 SEEN = np.isfinite(surface()).all(axis=2)
+UNSEEN_NOTE = f"{len(HOLES)} points that are not finite dropped: nothing was seen there"
 
 
 def write(folder: Path, name: str, data: bytes | None = None) -> Path:
@@ -70,7 +71,8 @@ def test_pcd_of_every_kind_keeps_grid_and_colors(name: str, tmp_path: Path):
         assert scan.colors is None
     else:
         assert_has_colors(scan)
-    assert scan.notes == (("fields left out: label",) if name == "binary.pcd" else ())
+    told = ("fields left out: label",) if name == "binary.pcd" else ()
+    assert scan.notes == (*told, UNSEEN_NOTE)
 
 
 def pcd_of(told: str, *lines: str, viewpoint: str = "0 0 0 1 0 0 0") -> bytes:
@@ -121,7 +123,8 @@ def test_ptx_gives_several_scans_with_poses(tmp_path: Path):
     assert (first.name, second.name) == ("two_1", "two_2")
     for scan in (first, second):
         assert_is_surface(scan)
-    assert first.notes == ("intensity read as grey",) and second.notes == (POSE_NOTE,)
+    assert first.notes == (UNSEEN_NOTE, "intensity read as grey")
+    assert second.notes == (UNSEEN_NOTE, POSE_NOTE)
     assert_has_colors(second)
     assert first.world_from_scan is not None and second.world_from_scan is not None
     np.testing.assert_array_equal(first.world_from_scan.matrix(), np.eye(4))
@@ -129,6 +132,15 @@ def test_ptx_gives_several_scans_with_poses(tmp_path: Path):
     assert first.content_hash() != second.content_hash()  # colours
     with pytest.raises(ReadError, match="has no scan 3, but 2"):
         read_scan(path, part=2)
+
+
+def test_a_local_origin_is_told_by_packed_files_too(tmp_path: Path):
+    text = b"# scanweld_shift 1000000 0 -2.5\n0 0 1\n1 0 1\n"
+    scan = read_scan(write(tmp_path, "a.xyz.gz", gzip.compress(text)))
+    np.testing.assert_array_equal(scan.points, [[1e6, 0, -1.5], [1e6 + 1, 0, -1.5]])
+    broken = text.replace(b"-2.5", b"nan")
+    with pytest.raises(ReadError, match="its scanweld_shift is not three numbers"):
+        read_scan(write(tmp_path, "a.xyz.gz", gzip.compress(broken)))
 
 
 def test_names_of_several_scans_do_not_clash(tmp_path: Path):

@@ -77,7 +77,7 @@ def run_job(
             no such cluster. Files that cannot be read are named in the result instead.
     """
     files, workers, memory = collect_named(inputs), limits.workers, limits.memory
-    paths = list(dict.fromkeys(file.path for file in files))
+    paths = [file.path for file in files]
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
         Workspace(Path(output), inputs=paths, force=force) as workspace,

@@ -9,10 +9,10 @@ from pathlib import Path, PurePath
 
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io.names import natural_key, printable
+from scanweld.io.names import natural_key, printable, stem_of, suffix_of
 from scanweld.io.not_scans import foreign_kind, inventory, why_unread
 from scanweld.io.read import part_names, read_scan
-from scanweld.io.scan_formats.registry import format_of, formats_by_suffix, stem_of, suffix_of
+from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
 
 logger = logging.getLogger(__name__)
 
@@ -103,11 +103,9 @@ def _expand(each: Path | str) -> list[Path]:
 
 def _scans_among(candidates: list[Path], where: str, named: str = "") -> list[Path]:
     """Those of the files that are scans, and whose suffix need not be named, or is."""
-    known = [
-        suffix
-        for suffix, form in formats_by_suffix().items()
-        if suffix not in form.only_named or suffix == named
-    ]
+    only_named = {suffix for form in formats_by_suffix().values() for suffix in form.only_named}
+    left_out = frozenset(only_named - {named})
+    known = [suffix for suffix in formats_by_suffix() if suffix not in left_out]
     scans: list[Path] = []
     others: list[Path] = []
     for path in candidates:
@@ -117,7 +115,7 @@ def _scans_among(candidates: list[Path], where: str, named: str = "") -> list[Pa
             scans.append(path)
         else:
             others.append(path)
-    found = inventory(others, frozenset(formats_by_suffix()) - frozenset(known))
+    found = inventory(others, left_out)
     if not scans:
         told = f", but {found}" if found else ""
         formats = ", ".join(known)

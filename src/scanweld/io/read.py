@@ -9,16 +9,11 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.local_origin import SHIFT_KEY, told_shift
+from scanweld.io.names import is_gzipped, stem_of, suffix_of
 from scanweld.io.not_scans import why_unread
 from scanweld.io.raw import RawScan, to_mesh, to_scan
 from scanweld.io.scan_formats.records import Keeps, Part
-from scanweld.io.scan_formats.registry import (
-    format_of,
-    formats_by_suffix,
-    is_gzipped,
-    stem_of,
-    suffix_of,
-)
+from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
 from scanweld.io.unpack import gunzip
 
 

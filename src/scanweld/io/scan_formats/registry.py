@@ -8,6 +8,7 @@ from pkgutil import iter_modules
 from types import MappingProxyType, ModuleType
 
 from scanweld.io import scan_formats
+from scanweld.io.names import suffix_of
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 
 Formats = MappingProxyType[str, ScanFormat]
@@ -26,21 +27,6 @@ def _modules() -> tuple[ModuleType, ...]:
     names = sorted(module.name for module in iter_modules(scan_formats.__path__))
     modules = [import_module(f"{scan_formats.__name__}.{name}") for name in names]
     return tuple(module for module in modules if hasattr(module, "FORMAT"))
-
-
-def suffix_of(path: PurePath) -> str:
-    """The suffix that tells a file's format, in lower case: that before a ``.gz``."""
-    return (PurePath(path.stem) if is_gzipped(path) else path).suffix.lower()
-
-
-def stem_of(path: PurePath) -> str:
-    """The file's name without that suffix, and without ``.gz``."""
-    return PurePath(path.stem).stem if is_gzipped(path) else path.stem
-
-
-def is_gzipped(path: PurePath) -> bool:
-    """Whether a file is packed as a whole, by its name."""
-    return path.suffix.lower() == ".gz"
 
 
 def format_of(path: PurePath) -> ScanFormat | None:
