@@ -22,6 +22,7 @@ from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan, PoseFormat
 from scanweld.io.pose_formats.records import printed
+from scanweld.io.read import part_names
 from scanweld.preparation.sensor import locate_sensor
 
 _ABOUT_SHIFT = ("model.ply", "model.obj", "model.stl")
@@ -52,6 +53,7 @@ class _Source:
         poses: Of the component's scans, in natural order.
         files: Where their files are, as far as they are needed,
         scans: and what they hold.
+        shared: Files that hold several scans.
         broken: Why others cannot be read, by name.
     """
 
@@ -59,6 +61,7 @@ class _Source:
     poses: Mapping[str, Pose]
     files: Mapping[str, ScanFile]
     scans: Mapping[str, RangeScan]
+    shared: Collection[Path]
     broken: Mapping[str, ScanweldError]
 
 
@@ -142,7 +145,9 @@ def _read(
             scans |= model.read_whole_scans({name: file})
         except (InputError, ReadError) as error:
             broken[name] = error
-    return _Source(model=model, poses=poses, files=files, scans=scans, broken=broken)
+    paths = {file.path for file in files.values()}
+    shared = {path for path in paths if len(part_names(path)) > 1}
+    return _Source(model=model, poses=poses, files=files, scans=scans, shared=shared, broken=broken)
 
 
 def _render(
@@ -219,6 +224,11 @@ def _posed(
     speaks_of_sensors = form.frame is Frame.SENSOR
     if name in source.broken and (form.needs_files or speaks_of_sensors):
         raise source.broken[name]
+    if form.needs_files and source.files[name].path in source.shared:
+        raise InputError(
+            f"{printed(name)}: shares its file with other scans, which {form.title} cannot tell "
+            "apart; ask for --poses cloudcompare or open3d"
+        )
     located = locate_sensor(source.scans[name]) if speaks_of_sensors else None
     return PosedScan(
         name=name,
