@@ -12,6 +12,7 @@ from scanweld.config import Config
 from scanweld.evidence import rivals
 from scanweld.evidence.evidence import (
     CONTRADICT_WEIGHT,
+    FREE_PATCH_WEIGHT,
     FREE_WEIGHT,
     FRONT_PATCH_WEIGHT,
     GRAZING_WEIGHT,
@@ -88,7 +89,7 @@ def test_report_page_gives_the_limits_of_the_code():
         f"- grazing / {1 / GRAZING_WEIGHT:g}",
         f"cosine of incidence > {MIN_FACING:g}",
         f"> {MAX_EXCESS:g}): a part of the object moved",
-        f"({FRONT_PATCH_WEIGHT:g} * front_patch + free_patch) / agree",
+        f"({FRONT_PATCH_WEIGHT:g} * front_patch + free_patch / {1 / FREE_PATCH_WEIGHT:g}) / agree",
         f"at most {MAX_CONTRADICTION:g}",
         f"agree < {MIN_AGREE:g}",
         f"more than {rivals.RIVAL_ANGLE_DEG:g} degrees or "

@@ -79,7 +79,7 @@ def test_stages_start_and_finish_in_turn_and_scans_are_refused_as_it_happens(
                 current = ""
             case ScanRefused():
                 pass
-    found = "prepare", "lay out", "pairs", "features", "search", "graph", "refine"
+    found = "prepare", "lay out", "pairs", "features", "search", "sensor", "graph", "refine"
     assert tuple(finished) == (*found, "confidence", "fuse")
     pairs = next(e for e in events if isinstance(e, StageFinished) and e.stage == "pairs")
     assert pairs.counts == {"pairs": 6, "placed": 3}

@@ -1,6 +1,7 @@
 """Errors of right scans -> what makes their deviations bounds that hold for 95 %."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
@@ -10,8 +11,8 @@ from scanweld.geometry.arrays import FloatArray
 
 HELD = 0.95
 """Share of the scans for which a bound holds."""
-SHARES = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
-"""Of the distance between surfaces, that are tried."""
+SHARES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+"""Of the distance between surfaces and of cycles that are tried."""
 LEAST = 1e-9
 """Errors below this are of the scan that the others are held against: it has none."""
 
@@ -31,13 +32,15 @@ def learn_bounds(records: Sequence[Record]) -> Bounds:
 
 
 def _scale(told: FloatArray) -> BoundScale:
-    """From errors, deviations and distances between surfaces, (N, 3)."""
+    """From errors, deviations, distances between surfaces and cycles, (N, 4)."""
     if not len(told):
-        return BoundScale(factor=2.0, share=0.0)
-    error, deviation, sigma = told[told[:, 0] > LEAST * told[:, 2]].T
+        return BoundScale(factor=2.0, sigma_share=0.0, cycle_share=0.0)
+    error, *parts = told[told[:, 0] > LEAST * told[:, 2]].T
     options = []
-    for share in SHARES:
-        ratio = np.log(error / np.hypot(deviation, share * sigma))
-        options.append((float(ratio.std()), float(np.exp(np.quantile(ratio, HELD))), share))
-    _, factor, share = min(options)
-    return BoundScale(factor=factor, share=share)
+    for shares in product(SHARES, SHARES):
+        weighed = [part * share for part, share in zip(parts, (1.0, *shares), strict=True)]
+        ratio = np.log(error / np.sqrt(np.square(weighed).sum(axis=0)))
+        factor = float(np.exp(np.quantile(ratio, HELD)))
+        options.append((float(ratio.std()), factor, *shares))
+    _, factor, of_sigma, of_cycle = min(options)
+    return BoundScale(factor=factor, sigma_share=of_sigma, cycle_share=of_cycle)

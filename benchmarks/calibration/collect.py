@@ -10,7 +10,6 @@ from benchmarks.calibration.scenes import make_set
 from benchmarks.judging.trial import is_right_pair
 from benchmarks.kept import Kept, Result, Unit
 from benchmarks.virtual.scene import Scene
-from scanweld.confidence.model import stored_calibration
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
 from scanweld.evaluation.metrics import evaluate_poses
@@ -81,22 +80,16 @@ def _with_errors(
     errors = evaluate_poses(
         estimate, scene.truth, centroids=scene.centroids, diameter=scene.diameter
     )
-    stored = stored_calibration().bounds
     for record in records:
-        error, report = errors.scans.get(record["name"]), found.scans[record["name"]]
-        turned, shifted = report.rotation_bound_deg, report.translation_bound
-        if found.sensor is None or error is None or turned is None or shifted is None:
+        error, told = errors.scans.get(record["name"]), found.scans[record["name"]].exactness
+        if found.sensor is None or error is None or not told:
             continue
         if record["right"] and np.isfinite(error.rotation_deg):
             sigma = found.sensor.sigma
             turn = float(np.degrees(sigma / lever_arm(found.sensor.diameter)))
             record["errors"] = {
-                "rotation": [error.rotation_deg, stored.rotation.deviation(turned, turn), turn],
-                "translation": [
-                    error.translation,
-                    stored.translation.deviation(shifted, sigma),
-                    sigma,
-                ],
+                "rotation": [error.rotation_deg, told["deviation_deg"], turn, told["cycle_deg"]],
+                "translation": [error.translation, told["deviation"], sigma, told["cycle"]],
             }
     return records
 

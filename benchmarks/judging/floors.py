@@ -19,9 +19,11 @@ ASSERTED = 0.5
 FACTOR_SLACK = 0.004
 """A factor that is named is this near to the true one."""
 NOT_MEASURED = "not measured"
-_NAMES_BODIES = re.compile(
-    r"did not move|stood still|moved by itself|more than one body|two bodies"
-)
+BOUNDS_HOLD, MIN_GROUP_HOLDS = (0.93, 0.98), 0.90
+"""Shares of the scans whose errors keep within bounds that are stated for 95 %."""
+NO_ERROR_DEG = 1e-6
+"""The scan that others are held against has no error."""
+_NAMES_BODIES = re.compile(r"did not move|stood still|moved|more than one body|two bodies|cut: ")
 _NUMBER = re.compile(r"(\d+\.\d+)(\s*%)?")
 
 
@@ -63,6 +65,7 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
         _accused([outcome for outcome in outcomes if outcome.group is Group.FILES]),
         _scaled([s for o in outcomes if o.group is Group.SCALE for s in o.scans if s.factor != 1]),
         *_confidence(outcomes),
+        *_bounded(outcomes),
         _none(
             "runs that crash",
             {f"of {len(outcomes)}": sum(o.verdict == judged.CRASH for o in outcomes)},
@@ -138,13 +141,42 @@ def _kept(name: str, asked: float, outcomes: Sequence[Outcome]) -> Floor:
 
 def _two_bodies(outcomes: Sequence[Outcome]) -> Floor:
     """Runs in which a part moves by itself, or the background stands still as the object turns."""
-    good = sum(outcome.verdict == Verdict.GOOD for outcome in outcomes)
+    # What was cut out of a standing room moves as one body, and may be good where it is right.
+    good = sum(o.verdict == Verdict.GOOD and "cut: " not in o.reason for o in outcomes)
     named = sum(map(names_bodies, outcomes))
     measure = "not all moves as one body: called good; the reason names it"
     if not outcomes:
         return Floor(measure, "0; all", NOT_MEASURED, None)
     told = f"{good} of {len(outcomes)} good, the reason names it in {named}"
     return Floor(measure, "0; all", told, not good and named == len(outcomes))
+
+
+def _bounded(outcomes: Sequence[Outcome]) -> list[Floor]:
+    """Whether errors keep within the bounds that are stated, of right scans that have any."""
+    held: dict[str, list[bool]] = {}
+    for outcome in outcomes:
+        for scan in outcome.scans:
+            has_error = (scan.rotation_deg or 0.0) > NO_ERROR_DEG
+            if scan.is_right and has_error and scan.rotation_bound_deg is not None:
+                held.setdefault(str(outcome.group), []).append(scan.is_bounded)
+    measure = "stated bounds of right scans hold"
+    if not held:
+        return [Floor(measure, "93 to 98 %", NOT_MEASURED, None)]
+    every = [one for group in held.values() for one in group]
+    reached = sum(every) / len(every)
+    shares = {group: sum(some) / len(some) for group, some in held.items()}
+    worst = min(shares, key=lambda group: shares[group])
+    told = f"least: {worst}, {100 * shares[worst]:.0f} % of {len(held[worst])}"
+    least, most = BOUNDS_HOLD
+    return [
+        Floor(
+            measure,
+            "93 to 98 %",
+            f"{100 * reached:.1f} % of {len(every)}",
+            least <= reached <= most,
+        ),
+        Floor(f"{measure}, each group", ">= 90 %", told, shares[worst] >= MIN_GROUP_HOLDS),
+    ]
 
 
 def _scaled(scans: Sequence[ScanOutcome]) -> Floor:

@@ -24,6 +24,8 @@ from scanweld.reconstruction import PairReport, Reconstruction
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=100))
 """The defaults, but for a coarse model: only poses are looked at."""
+CUT = "cut: "
+"""How the note begins that says what was cut off a scan."""
 PAIR_DEG, PAIR_PERCENT = 5.0, 3.0
 """A pair's pose is right within these; the joint refinement comes after it."""
 MAX_REASON = 160
@@ -70,7 +72,8 @@ def try_out(scenario: str, seed: int) -> Outcome:
     try:
         found = run(scene.scans, CONFIG, workers=1)
         verdict, (scans, pairs) = str(found.verdict), judge(found, scene)
-        reason = "; ".join(found.reasons)
+        cut = {n for scan in found.scans.values() for n in scan.notes if n.startswith(CUT)}
+        reason = "; ".join([*found.reasons, *sorted(cut)[:1]])
     except ScanweldError as error:
         verdict, reason = ERROR, str(error)
     except Exception:

@@ -85,6 +85,7 @@ class ScanReport:
         rotation_bound_deg: Its rotation beside the others of its component is off by no more, at
             95 %, if it is placed rightly; None if unplaced.
         translation_bound: The same of its centroid, in the scans' unit.
+        exactness: What the bounds rest on, see docs/report.md.
     """
 
     verdict: ScanVerdict
@@ -108,6 +109,7 @@ class ScanReport:
     grounds: Mapping[str, float] = field(default_factory=dict)
     rotation_bound_deg: float | None = None
     translation_bound: float | None = None
+    exactness: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

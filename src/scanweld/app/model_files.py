@@ -55,6 +55,12 @@ class StageEntry(Entry):
         return self.model_extra or {}
 
 
+class SensorEntry(Entry):
+    """What report.json says of the sensor, in a sentence."""
+
+    words: str
+
+
 class Report(Entry):
     """report.json."""
 
@@ -62,6 +68,7 @@ class Report(Entry):
     verdict: Verdict
     reasons: tuple[str, ...]
     knowledge: tuple[FactReport, ...] = ()
+    sensor: SensorEntry | None = None
     scans: dict[str, ScanReport]
     stages: dict[str, StageEntry]
     settings: dict[str, Any]

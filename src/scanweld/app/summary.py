@@ -23,6 +23,7 @@ def summary(result: Reconstruction, output: Path) -> str:
         lines += [f"  component {k + 1}: {', '.join(c)}" for k, c in enumerate(result.components)]
     lines += [f"  {fact.verdict} {fact.fact}: {fact.reason}" for fact in result.knowledge]
     lines += _least_sure(result)
+    lines += _exact_to(result)
     if result.preview is not None:
         lines.append(f"  no model: all of its scans are doubtful; {PREVIEW} shows where they lie")
     elif result.poses and result.mesh is None:
@@ -60,6 +61,23 @@ def _least_sure(result: Reconstruction) -> list[str]:
         if scan.confidence is not None
     ]
     return [f"  least sure {name}: confidence {least:.3f}" for least, name in sorted(known)[:1]]
+
+
+def _exact_to(result: Reconstruction) -> list[str]:
+    """The bounds that hold for all good scans."""
+    bounds = [
+        (scan.rotation_bound_deg, scan.translation_bound)
+        for scan in result.scans.values()
+        if scan.verdict is ScanVerdict.GOOD
+    ]
+    turns = [turn for turn, _ in bounds if turn is not None]
+    shifts = [shift for _, shift in bounds if shift is not None]
+    if result.sensor is None or not turns or not shifts:
+        return []
+    share = max(shifts) / result.sensor.diameter
+    return [
+        f"  good scans are exact to {max(turns):.2g} deg and {share:.2%} of the diameter (95 %)"
+    ]
 
 
 def _in_order(reasons: dict[str, str]) -> list[tuple[str, str]]:

@@ -12,9 +12,9 @@ from scanweld.evidence.visibility import two_way_evidence
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
-from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
+from scanweld.graph.doubts import DoubtCode
 from scanweld.graph.reasons import why_open
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.pairs.result import Alternative, PairResult, weights_of
@@ -54,7 +54,7 @@ def conclude(
     for k, scan in enumerate(prepared):
         report = _scan_report(k, scene, graph)
         report = _with_confidence(report, confidence.scans.get(k))
-        scans[scan.name] = _with_bound(report, confidence.bounds.get(k))
+        scans[scan.name] = _with_bound(report, k, confidence)
     verdict, reasons = _verdict(graph, scans, mesh, facts, config)
     return Reconstruction(
         poses=_poses(prepared, graph),
@@ -92,10 +92,21 @@ def _with_confidence(report: Report, assessed: Assessed | None) -> Report:
     return replace(report, confidence=assessed.confidence, grounds=assessed.grounds)
 
 
-def _with_bound(report: ScanReport, bound: PoseTolerance | None) -> ScanReport:
-    if bound is None:
+def _with_bound(report: ScanReport, k: int, confidence: Confidence) -> ScanReport:
+    bound, told = confidence.bounds.get(k), confidence.exactness.get(k)
+    if bound is None or told is None:
         return report
-    return replace(report, rotation_bound_deg=bound.angle_deg, translation_bound=bound.shift)
+    return replace(
+        report,
+        rotation_bound_deg=bound.angle_deg,
+        translation_bound=bound.shift,
+        exactness={
+            "deviation_deg": told.deviation.angle_deg,
+            "deviation": told.deviation.shift,
+            "cycle_deg": told.cycle.angle_deg,
+            "cycle": told.cycle.shift,
+        },
+    )
 
 
 def _others(poses: Mapping[int, Pose], reference: int) -> list[int]:
@@ -258,6 +269,18 @@ def _overlap_share(evidence: Evidence) -> float:
     return evidence.agree + evidence.contradict
 
 
+def _bodies(graph: ViewGraph) -> list[str]:
+    """That not all of what the scans show moves as one body, where that is in doubt."""
+    doubts = [doubt for some in graph.doubts.values() for doubt in some]
+    told = sorted({doubt.text for doubt in doubts if doubt.code is DoubtCode.CAMERA_STOOD})
+    if any(doubt.code is DoubtCode.MOVED_PART for doubt in doubts):
+        told.append(
+            "parts of scans lie where other sensors saw through: a part of the object moved by "
+            "itself, or a pose is wrong"
+        )
+    return told
+
+
 def _verdict(
     graph: ViewGraph,
     scans: Mapping[str, ScanReport],
@@ -282,6 +305,7 @@ def _verdict(
     if by_verdict[ScanVerdict.DOUBTFUL]:
         told = "" if config.fusion.with_doubtful else " (placed, but left out of the model)"
         reasons.append(f"doubtful: {', '.join(by_verdict[ScanVerdict.DOUBTFUL])}{told}")
+    reasons += _bodies(graph)
     if by_verdict[ScanVerdict.UNPLACED]:
         reasons.append(f"not placed: {', '.join(by_verdict[ScanVerdict.UNPLACED])}")
     if len(graph.components) > 1:

@@ -89,6 +89,7 @@ def estimate_scales(
     terms: list[Term] = []
     centres: dict[int, FloatArray] = {}
     for _ in range(NUM_ROUNDS):
+        terms.clear()  # those of this round take as much memory
         grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
         terms = _surface_terms(grown, poses, pairs, diameter)
         order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
@@ -96,7 +97,6 @@ def estimate_scales(
             return {}
         centres = {k: poses[k].apply(grown[k].points.mean(axis=0)) for k in order}
         twists, steps, spreads = _solve(terms, order, centres, arm)
-        terms.clear()  # those of the next round take as much memory
         middle = np.mean([centres[k] for k in order], axis=0)
         for k, twist, step, spread in zip(order, twists, steps, spreads, strict=True):
             # Grown about the sensor in the next round, it is moved back to where it was.

@@ -44,7 +44,7 @@ def pose_deviations(
     order = sorted(world_from_sensor)
     radius = max(MATCH_SIGMAS * sensor.sigma, 0.006 * diameter)
     found = match_surfaces(sources, world_from_sensor, pairs, radius)
-    middles = {k: world_from_sensor[k].apply(sources[k].points.mean(axis=0)) for k in order}
+    middles = {k: world_from_sensor[k].apply(_middle(sources[k])) for k in order}
     covariance = _covariance(found, order, world_from_sensor, middles, sensor)
     arm = lever_arm(diameter)
     deviations = {}
@@ -54,6 +54,11 @@ def pose_deviations(
         shift = float(np.sqrt(np.trace(block[3:, 3:])))
         deviations[k] = PoseTolerance(angle_deg=float(np.degrees(turn)), shift=shift)
     return deviations
+
+
+def _middle(source: SurfaceSource) -> FloatArray:
+    """Mean of a scan's points (3,); where it has none that can be matched, its sensor's place."""
+    return source.points.mean(axis=0) if len(source.points) else np.zeros(3)
 
 
 def _covariance(

@@ -159,6 +159,10 @@ def _outcome(model: ModelFolder) -> dict[str, Any]:
         "unplaced": of(ScanVerdict.UNPLACED),
         "components": poses.components,
         "scans_have_confidence": any(scan.confidence is not None for scan in report.scans.values()),
+        "scans_have_bounds": any(
+            scan.translation_bound is not None for scan in report.scans.values()
+        ),
+        "sensor_words": None if report.sensor is None else report.sensor.words,
         "seconds": sum(stage.seconds for stage in report.stages.values()),
         "peak_mb": max((stage.peak_mb for stage in report.stages.values()), default=None),
         "most_seconds": max((stage.seconds for stage in report.stages.values()), default=0) or 1,

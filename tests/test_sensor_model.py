@@ -1,0 +1,189 @@
+"""What a set says of its sensor: noise and bent depth apart, patches, what stood still, bounds."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scanweld.confidence.bounds import Bounds, BoundScale, Exactness
+from scanweld.config import PrepareConfig
+from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
+from scanweld.evidence.sample_patches import violating_patches
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.pose import Pose
+from scanweld.geometry.pose_tolerance import PoseTolerance
+from scanweld.geometry.prepared import PixelKind
+from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.pairs.quick import search_quickly
+from scanweld.pairs.result import PairKind, PairResult
+from scanweld.pairs.verdict import MAX_CONTRADICTION, held_to
+from scanweld.preparation.range_image import make_range_image, natural_pixel
+from scanweld.sensor.learn import learn_sensor
+from scanweld.sensor.model import SensorModel
+from scanweld.sensor.standing import moved_share, standing_scans
+from tests.prepared import PreparedPair, creature_pair
+
+USUAL = 0.012
+
+
+def learnt(pair: PreparedPair, *results: PairResult) -> SensorModel:
+    pairs = {(2 * n, 2 * n + 1): replace(r, i=2 * n, j=2 * n + 1) for n, r in enumerate(results)}
+    fields = [field for _ in results for field in pair.fields]
+    return learn_sensor(pairs, fields, pair.diameter, USUAL * pair.diameter, 0.1)
+
+
+def with_depth(field: ScanField, change: Callable[[FloatArray], FloatArray]) -> ScanField:
+    """The scan with other depths: its pixels, samples and surface move along the rays."""
+    raster = field.raster.copy()
+    raster[..., RASTER_DEPTH] += change(raster[..., RASTER_DEPTH].astype(np.float64))
+    return replace(field, raster=raster)
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[PreparedPair, PairResult]:
+    pair = creature_pair(30)
+    return pair, search_quickly(pair.problem())
+
+
+def test_exact_scans_are_judged_as_usual_and_nothing_is_learnt_from_what_is_not_certain(
+    found: tuple[PreparedPair, PairResult],
+):
+    pair, result = found
+    assert result.kind is PairKind.GOOD
+    sensor = learnt(pair, result, result)
+    assert sensor.num_certain == 2
+    assert sensor.tolerance == USUAL * pair.diameter
+    assert 0.1 <= sensor.max_contradiction < 0.12 and not sensor.is_trimmed
+    assert sensor.sigma < 0.003 * pair.diameter
+    assert "2 certain pairs" in sensor.words()
+    doubtful = replace(result, margin=0.3)
+    none = learnt(pair, doubtful)
+    assert none.num_certain == 0 and none.tolerance == sensor.tolerance
+    assert none.max_contradiction == 0.1
+    assert "too few pairs" in none.words()
+
+
+def test_a_coarser_sensor_is_judged_wider_up_to_a_limit(found: tuple[PreparedPair, PairResult]):
+    """Surfaces that lie apart by noise widen the tolerance, in proportion."""
+    pair, result = found
+    i, j = pair.fields
+    rng = np.random.default_rng(3)
+    widths = []
+    for noise in (0.003, 0.005, 0.02):
+        fields = []
+        for field in (i, j, i, j):
+            shifts = noise * pair.diameter * rng.normal(size=(len(field.points), 1))
+            fields.append(replace(field, points=field.points + shifts * field.normals))
+        pairs = {(0, 1): result, (2, 3): replace(result, i=2, j=3)}
+        sensor = learn_sensor(pairs, fields, pair.diameter, USUAL * pair.diameter, 0.1)
+        widths.append(sensor.tolerance / pair.diameter)
+        assert sensor.correlated < 0.5 * sensor.white or noise > 0.01, "each is off by itself"
+    assert USUAL < widths[0] < widths[1] < widths[2] <= 0.03 + 1e-12
+
+
+def test_what_violates_together_counts_and_what_is_scattered_does_not(
+    found: tuple[PreparedPair, PairResult],
+):
+    pair, _ = found
+    i, j = pair.fields
+    tolerance = USUAL * pair.diameter
+    ((front, free),) = violating_patches(i, j, [pair.i_from_j], tolerance)
+    assert front < 0.01 and free < 0.01
+    # One in twenty of j's samples pulled out of its surface: at random, and all in one place.
+    count = len(j.points) // 20
+    rng = np.random.default_rng(5)
+    at_random = rng.choice(len(j.points), count, replace=False)
+    place = j.points[np.argmin(np.linalg.norm(j.points - j.centre, axis=1))]
+    together = np.argsort(np.linalg.norm(j.points - place, axis=1))[:count]
+    sizes = []
+    for chosen in (at_random, together):
+        points = j.points.copy()
+        points[chosen] += 4 * tolerance * j.normals[chosen]
+        moved = replace(j, points=points)
+        sizes.append(violating_patches(i, moved, [pair.i_from_j], tolerance)[0].sum())
+    assert sizes[1] > 2.5 * sizes[0]
+    swapped = violating_patches(j, i, [pair.i_from_j.inverse()], tolerance)
+    np.testing.assert_allclose(swapped, [[front, free]], atol=0.01)
+
+
+def test_a_pair_is_contradicted_by_the_limit_of_its_set(found: tuple[PreparedPair, PairResult]):
+    _, result = found
+    assert result.best is not None
+    told = replace(result.best.evidence, front_patch=0.1 * result.best.evidence.agree)
+    assert told.contradiction == pytest.approx(0.2, abs=0.02)
+    assert held_to(result, 0.25, told) is result
+    held = held_to(result, 0.15, told)
+    assert held.kind is PairKind.CONTRADICTED and "saw through" in held.reason
+    assert held.alternatives == result.alternatives
+    assert MAX_CONTRADICTION > 0.25
+
+
+# What stays and what moves.
+
+
+def test_a_region_that_moved_before_a_standing_camera_is_found_and_noise_is_not():
+    pair = creature_pair(30)
+    field, diameter = pair.fields[0], pair.diameter
+    rng = np.random.default_rng(7)
+    noisy = with_depth(field, lambda depth: rng.normal(size=depth.shape) * 0.001 * diameter)
+    assert moved_share(field, noisy, Pose.identity(), diameter) == 0.0
+    rows, columns = np.nonzero(field.raster[..., RASTER_KIND] == float(PixelKind.SURFACE))
+    middle = int(np.median(rows)), int(np.median(columns))
+
+    def pushed(depth: FloatArray) -> FloatArray:
+        change = np.zeros_like(depth)
+        change[middle[0] - 6 : middle[0] + 6, middle[1] - 6 : middle[1] + 6] = 0.05 * diameter
+        return change
+
+    moved = with_depth(noisy, pushed)
+    share = moved_share(field, moved, Pose.identity(), diameter)
+    assert 0.3 * 144 / len(rows) < share < 1.5 * 144 / len(rows)
+    scans = {k: Pose.identity() for k in range(3)}
+    edges = [(0, 1), (0, 2), (1, 2)]
+    found = standing_scans([field, moved, noisy], scans, edges, diameter)
+    assert found is not None and found.scans == (0, 1, 2)
+    assert "the camera did not move" in found.words()
+    assert standing_scans([field, noisy, field], scans, edges, diameter) is None, "duplicates"
+    turned = {**scans, 1: Pose.exp([0, 0.2, 0, 0, 0, 0]), 2: Pose.exp([0, 0.4, 0, 0, 0, 0])}
+    assert standing_scans([field, moved, noisy], turned, edges, diameter) is None, "it moved"
+
+
+# Bounds.
+
+
+def test_bounds_grow_with_all_that_makes_a_pose_less_exact():
+    scale = BoundScale(factor=2.0, sigma_share=0.1, cycle_share=0.5)
+    bounds = Bounds(rotation=scale, translation=scale)
+
+    def bound(deviation: float, cycle: float, sigma: float) -> PoseTolerance:
+        told = Exactness(
+            deviation=PoseTolerance(angle_deg=deviation, shift=deviation),
+            cycle=PoseTolerance(angle_deg=cycle, shift=cycle),
+        )
+        return bounds.of(told, sigma, 100.0)
+
+    assert bound(0.3, 0.0, 0.0).shift == pytest.approx(0.6)
+    assert bound(0.3, 0.8, 0.0).shift == pytest.approx(1.0)
+    assert bound(0.3, 0.8, 5.0).shift > 1.0
+    assert bound(1e6, 0.0, 0.0) == PoseTolerance(angle_deg=180.0, shift=100.0)
+
+
+def test_a_splat_lies_on_a_tilted_plane_wherever_its_points_fall():
+    """Points without a grid: the nearest of each pixel would bring the plane forward."""
+    rng = np.random.default_rng(11)
+    xy = rng.uniform(-50, 50, size=(40_000, 2))
+    points = np.column_stack([xy, 400.0 + 0.8 * xy[:, 0]])
+    scan = RangeScan(
+        name="plane",
+        points=points,
+        scan_from_sensor=Pose.identity(),
+        viewpoint=Viewpoint.ESTIMATED,
+    )
+    spacing = 0.5
+    image, _ = make_range_image(scan, points, spacing, 150.0, PrepareConfig())
+    assert natural_pixel(scan, spacing) > spacing
+    seen = image.points()[np.isfinite(image.depth) & ~image.is_rim]
+    off = seen[:, 2] - (400.0 + 0.8 * seen[:, 0])
+    assert abs(np.median(off)) < 0.01 * image.pixel
+    assert np.quantile(np.abs(off), 0.95) < 0.3 * image.pixel
