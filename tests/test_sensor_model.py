@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanweld.confidence.bounds import Bounds, BoundScale, Exactness
+from scanweld.confidence.bounds import Bounds, BoundScale
 from scanweld.config import PrepareConfig
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
 from scanweld.evidence.sample_patches import violating_patches
@@ -152,21 +152,19 @@ def test_a_region_that_moved_before_a_standing_camera_is_found_and_noise_is_not(
 # Bounds.
 
 
-def test_bounds_grow_with_all_that_makes_a_pose_less_exact():
-    scale = BoundScale(factor=2.0, sigma_share=0.1, cycle_share=0.5)
+def test_bounds_grow_with_the_deviation_and_with_the_distance_of_surfaces():
+    scale = BoundScale(factor=2.0, of_deviation=0.5, of_sigma=0.5)
     bounds = Bounds(rotation=scale, translation=scale)
 
-    def bound(deviation: float, cycle: float, sigma: float) -> PoseTolerance:
-        told = Exactness(
-            deviation=PoseTolerance(angle_deg=deviation, shift=deviation),
-            cycle=PoseTolerance(angle_deg=cycle, shift=cycle),
-        )
-        return bounds.of(told, sigma, 100.0)
+    def bound(deviation: float, sigma: float, unit: float = 1.0) -> PoseTolerance:
+        told = {0: PoseTolerance(angle_deg=deviation, shift=deviation * unit)}
+        return bounds.of(told, sigma * unit, 100.0 * unit)[0]
 
-    assert bound(0.3, 0.0, 0.0).shift == pytest.approx(0.6)
-    assert bound(0.3, 0.8, 0.0).shift == pytest.approx(1.0)
-    assert bound(0.3, 0.8, 5.0).shift > 1.0
-    assert bound(1e6, 0.0, 0.0) == PoseTolerance(angle_deg=180.0, shift=100.0)
+    assert bound(0.4, 0.1).shift == pytest.approx(0.4)
+    assert bound(0.8, 0.1).shift > bound(0.4, 0.1).shift
+    assert bound(0.4, 0.4).angle_deg == pytest.approx(2 * bound(0.4, 0.1).angle_deg)
+    assert bound(0.4, 0.1, 1000.0).shift == pytest.approx(1000 * bound(0.4, 0.1).shift)
+    assert bound(1e9, 50.0) == PoseTolerance(angle_deg=180.0, shift=100.0)
 
 
 def test_a_splat_lies_on_a_tilted_plane_wherever_its_points_fall():

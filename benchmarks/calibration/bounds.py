@@ -1,7 +1,6 @@
 """Errors of right scans -> what makes their deviations bounds that hold for 95 %."""
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
@@ -11,20 +10,14 @@ from scanweld.geometry.arrays import FloatArray
 
 HELD = 0.95
 """Share of the scans for which a bound holds."""
-SHARES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
-"""Of the distance between surfaces and of cycles that are tried."""
 LEAST = 1e-9
 """Errors below this are of the scan that the others are held against: it has none."""
 
 
 def learn_bounds(records: Sequence[Record]) -> Bounds:
-    """Of each kind of error, the bound that holds for 95 % and says most.
-
-    That which says most is the one whose ratio to the errors varies least from scan to scan.
-    """
-    told = [
-        scan["errors"] for record in records for scan in record.result["scans"] if "errors" in scan
-    ]
+    """Powers by least squares over the logarithms; then a factor by which 95 % are bounded."""
+    scans = [scan for record in records for scan in record.result["scans"]]
+    told = [scan["errors"] for scan in scans if "errors" in scan]
     return Bounds(
         rotation=_scale(np.array([one["rotation"] for one in told])),
         translation=_scale(np.array([one["translation"] for one in told])),
@@ -32,15 +25,16 @@ def learn_bounds(records: Sequence[Record]) -> Bounds:
 
 
 def _scale(told: FloatArray) -> BoundScale:
-    """From errors, deviations, distances between surfaces and cycles, (N, 4)."""
-    if not len(told):
-        return BoundScale(factor=2.0, sigma_share=0.0, cycle_share=0.0)
-    error, *parts = told[told[:, 0] > LEAST * told[:, 2]].T
-    options = []
-    for shares in product(SHARES, SHARES):
-        weighed = [part * share for part, share in zip(parts, (1.0, *shares), strict=True)]
-        ratio = np.log(error / np.sqrt(np.square(weighed).sum(axis=0)))
-        factor = float(np.exp(np.quantile(ratio, HELD)))
-        options.append((float(ratio.std()), factor, *shares))
-    _, factor, of_sigma, of_cycle = min(options)
-    return BoundScale(factor=factor, sigma_share=of_sigma, cycle_share=of_cycle)
+    """From errors, deviations and distances between surfaces, (N, 3)."""
+    told = told[told[:, 0] > LEAST] if len(told) else told
+    if len(told) < 3:
+        return BoundScale(factor=2.0, of_deviation=1.0, of_sigma=0.0)
+    error, deviation, sigma = np.log(told).T
+    terms = np.column_stack([np.ones(len(told)), deviation, sigma])
+    (_, of_deviation, of_sigma), *_ = np.linalg.lstsq(terms, error, rcond=None)
+    left = error - of_deviation * deviation - of_sigma * sigma
+    return BoundScale(
+        factor=float(np.exp(np.quantile(left, HELD))),
+        of_deviation=float(of_deviation),
+        of_sigma=float(of_sigma),
+    )

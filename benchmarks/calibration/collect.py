@@ -81,15 +81,17 @@ def _with_errors(
         estimate, scene.truth, centroids=scene.centroids, diameter=scene.diameter
     )
     for record in records:
-        error, told = errors.scans.get(record["name"]), found.scans[record["name"]].exactness
-        if found.sensor is None or error is None or not told:
+        error, report = errors.scans.get(record["name"]), found.scans[record["name"]]
+        if found.sensor is None or error is None or report.deviation is None:
             continue
         if record["right"] and np.isfinite(error.rotation_deg):
-            sigma = found.sensor.sigma
-            turn = float(np.degrees(sigma / lever_arm(found.sensor.diameter)))
+            diameter, sigma = found.sensor.diameter, found.sensor.sigma
+            turns = error.rotation_deg, report.deviation_deg
             record["errors"] = {
-                "rotation": [error.rotation_deg, told["deviation_deg"], turn, told["cycle_deg"]],
-                "translation": [error.translation, told["deviation"], sigma, told["cycle"]],
+                "rotation": [*np.radians(turns).tolist(), sigma / lever_arm(diameter)],
+                "translation": [
+                    length / diameter for length in (error.translation, report.deviation, sigma)
+                ],
             }
     return records
 

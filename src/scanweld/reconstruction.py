@@ -85,7 +85,9 @@ class ScanReport:
         rotation_bound_deg: Its rotation beside the others of its component is off by no more, at
             95 %, if it is placed rightly; None if unplaced.
         translation_bound: The same of its centroid, in the scans' unit.
-        exactness: What the bounds rest on, see docs/report.md.
+        deviation_deg: Standard deviation of its rotation by information and noise alone; None if
+            unplaced.
+        deviation: The same of its centroid, in the scans' unit.
     """
 
     verdict: ScanVerdict
@@ -109,7 +111,8 @@ class ScanReport:
     grounds: Mapping[str, float] = field(default_factory=dict)
     rotation_bound_deg: float | None = None
     translation_bound: float | None = None
-    exactness: Mapping[str, float] = field(default_factory=dict)
+    deviation_deg: float | None = None
+    deviation: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from scanweld.confidence.bounds import Exactness
 from scanweld.confidence.diagnostics import PairDiagnostics
 from scanweld.confidence.grounds import (
     LEAST_OBSERVABILITY,
@@ -44,13 +43,13 @@ class Confidence:
         pairs: Confidence in pairs.
         scans: Confidence in scans.
         bounds: How far the pose of a scan may be off, at 95 %, if it is right.
-        exactness: What the bounds rest on.
+        deviations: Standard deviations that the bounds rest on.
     """
 
     pairs: Mapping[Edge, Assessed] = field(default_factory=dict)
     scans: Mapping[int, Assessed] = field(default_factory=dict)
     bounds: Mapping[int, PoseTolerance] = field(default_factory=dict)
-    exactness: Mapping[int, Exactness] = field(default_factory=dict)
+    deviations: Mapping[int, PoseTolerance] = field(default_factory=dict)
 
 
 def assess(

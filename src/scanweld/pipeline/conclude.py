@@ -93,19 +93,15 @@ def _with_confidence(report: Report, assessed: Assessed | None) -> Report:
 
 
 def _with_bound(report: ScanReport, k: int, confidence: Confidence) -> ScanReport:
-    bound, told = confidence.bounds.get(k), confidence.exactness.get(k)
-    if bound is None or told is None:
+    bound, deviation = confidence.bounds.get(k), confidence.deviations.get(k)
+    if bound is None or deviation is None:
         return report
     return replace(
         report,
         rotation_bound_deg=bound.angle_deg,
         translation_bound=bound.shift,
-        exactness={
-            "deviation_deg": told.deviation.angle_deg,
-            "deviation": told.deviation.shift,
-            "cycle_deg": told.cycle.angle_deg,
-            "cycle": told.cycle.shift,
-        },
+        deviation_deg=deviation.angle_deg,
+        deviation=deviation.shift,
     )
 
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from scanweld.confidence.assess import Confidence, assess
-from scanweld.confidence.bounds import Exactness, exactness_of
 from scanweld.confidence.diagnostics import PairDiagnostics, diagnostics_of
 from scanweld.confidence.model import stored_calibration
 from scanweld.config import Config
@@ -145,8 +144,8 @@ def assess_placed(
     with stages.stage("confidence") as counts:
         diagnostics = diagnostics_of(scene.intake.prepared, scene.judge, config.contours)
         confidence = assess(graph, diagnostics, stored_calibration(), config)
-        bounds, exactness = _bounds(scene, graph, diagnostics)
-        confidence = replace(confidence, bounds=bounds, exactness=exactness)
+        bounds, deviations = _bounds(scene, graph, diagnostics)
+        confidence = replace(confidence, bounds=bounds, deviations=deviations)
         unsure = {
             k: f"its pose is right with a probability of {found.confidence:.0%} only"
             for k, found in confidence.scans.items()
@@ -180,19 +179,17 @@ def _inexact(bounds: Mapping[int, PoseTolerance], scene: Scene, config: Config) 
 
 def _bounds(
     scene: Scene, graph: ViewGraph, diagnostics: PairDiagnostics
-) -> tuple[dict[int, PoseTolerance], dict[int, Exactness]]:
-    """How far the pose of each placed scan may be off, and what tells it."""
+) -> tuple[dict[int, PoseTolerance], dict[int, PoseTolerance]]:
+    """How far the pose of each placed scan may be off, and its standard deviation."""
     if scene.sensor is None:
         return {}, {}
     sources, sensor = dict(enumerate(diagnostics.sources)), scene.sensor
-    centres, told = dict(enumerate(scene.judge.centres)), dict[int, Exactness]()
+    deviations: dict[int, PoseTolerance] = {}
     for component in graph.components:
         compared = graph.compared(component)
-        deviations = pose_deviations(sources, component.poses, compared, sensor)
-        told.update(exactness_of(graph, component, deviations, centres))
-    scale = stored_calibration().bounds
-    bounds = {k: scale.of(one, sensor.sigma, sensor.diameter) for k, one in told.items()}
-    return bounds, told
+        deviations.update(pose_deviations(sources, component.poses, compared, sensor))
+    bounds = stored_calibration().bounds.of(deviations, sensor.sigma, sensor.diameter)
+    return bounds, deviations
 
 
 def check_knowledge(
