@@ -23,8 +23,10 @@ from scanweld.evidence.evidence import (
 from scanweld.evidence.visibility import AGREE_COSINE, CONTRADICT_COSINE, MIN_FACING
 from scanweld.graph.reasons import OUTWEIGHED
 from scanweld.graph.refine_graph import MAX_SCORE_LOSS
+from scanweld.io.scan_formats.registry import format_rows, formats_markdown
 from scanweld.knowledge import turntable
 from scanweld.pairs.verdict import MAX_CONTRADICTION
+from tests import command_line
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -58,6 +60,16 @@ def test_links_lead_somewhere(path: Path):
         assert target.exists(), link
         if heading:
             assert heading in _headings(target), link
+
+
+def test_formats_page_has_the_table_that_the_command_prints(capsys: pytest.CaptureFixture[str]):
+    page = (DOCS / "formats.md").read_text(encoding="utf-8")
+    found = re.search(r"<!-- begin: scan-formats -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
+    assert found and found[1] == formats_markdown(), formats_markdown()
+    assert command_line.scanweld("formats") == 0
+    printed = capsys.readouterr().out
+    for suffixes, title, kept in format_rows():
+        assert suffixes in printed and f"{title}\n    kept besides points: {kept}" in printed
 
 
 def _headings(page: Path) -> set[str]:

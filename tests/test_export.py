@@ -282,6 +282,27 @@ def test_other_components_and_unplaced_scans_are_said(
     assert {path.stem for path in Path("b/cloudcompare").iterdir()} == {"scan_03"}
 
 
+def test_scans_of_one_file_are_not_posed_by_its_name(
+    model: Path, scene: Scene, capsys: pytest.CaptureFixture[str]
+):
+    texts, files = [], {}
+    for k, scan in enumerate(scene.scans):
+        head = f"{len(scan.points)}\n1\n" + "0 0 0\n" * 4 + "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+        texts.append(head + "".join(f"{x!r} {y!r} {z!r} 0.5\n" for x, y, z in scan.points.tolist()))
+        files[scan.name] = {"file": "../scans/all.ptx", "part": k}
+    Path("scans/all.ptx").write_text("".join(texts))
+    (model / "report.json").write_text(json.dumps({"format": 1, "scans": files}))
+    wanted = ("--poses", "mlp", "--poses", "open3d", "--points", "all.ply", "-o", "out")
+    assert scanweld("export", model, *wanted) == 3
+    assert "shares its file with other scans" in capsys.readouterr().out
+    assert not Path("out/poses.mlp").exists()
+    check(Path("out/posegraph.json"), scene)
+    points, of_scan, _ = points_of(Path("out/all.ply"))
+    for k, scan in enumerate(scene.scans):
+        moved = scene.world_from_scan[scan.name].apply(scan.points)
+        np.testing.assert_allclose(points[of_scan == k], moved, atol=1e-9)
+
+
 def test_scans_that_moved_are_found_where_said(model: Path, capsys: pytest.CaptureFixture[str]):
     shutil.move("scans", "moved")
     before = snapshot()

@@ -23,7 +23,7 @@ from scanweld.app.html_report.surface_check import check_surface, open_borders, 
 from scanweld.app.html_report.view_graph import pair_level
 from scanweld.app.model_files import PairEntry
 from scanweld.app.model_folder import open_model
-from scanweld.app.outputs import write_outputs
+from scanweld.app.outputs import Place, write_outputs
 from scanweld.config import Config, FusionConfig, PrepareConfig
 from scanweld.errors import ReadError
 from scanweld.evaluation.primitives import sphere
@@ -364,7 +364,7 @@ def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixt
     assert num_pictures(folder) == 8
     assert command("report", folder) == 0  # where they are, this folder does not say
     assert num_pictures(folder) == 3
-    write_outputs(result, folder, {scan.name: f"../scans/{scan.name}.ply" for scan in read})
+    write_outputs(result, folder, {s.name: Place(file=f"../scans/{s.name}.ply") for s in read})
     assert command("report", folder) == 0
     assert num_pictures(folder) == 8
     assert command("report", folder, "--scans", scans / f"{read[0].name}.ply") == 1

@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
 from scanweld.io import read_scan
+from scanweld.preparation import prepare
 from scanweld.preparation.resolution import point_spacing
 from scanweld.preparation.sensor import locate_sensor
 from tests.data import require_data
@@ -250,3 +252,52 @@ def test_point_spacing_of_a_lattice(scale: float):
     lattice = scale * np.stack([columns.ravel(), 3 * rows.ravel(), 0 * rows.ravel()], axis=1)
     assert point_spacing(lattice) == pytest.approx(scale)
     assert point_spacing(np.repeat(lattice, 2, axis=0)) == pytest.approx(scale)
+
+
+def around(width: int, turn: float, *, step: float = 2 * np.pi / 1600, up: int = 1) -> RangeScan:
+    """A lumpy body 5 away, seen by a scanner at the origin that turns about z.
+
+    Args:
+        width: Columns, from the azimuth ``turn`` on; they grow with it.
+        turn: In radians.
+        step: Between columns and between rows, likewise.
+        up: 1 if rows count upward, -1 if downward.
+    """
+    rows, columns = np.mgrid[:160, :width].astype(float)
+    azimuth, elevation = turn + step * columns, up * step * (rows - 70)
+    away = (azimuth + np.pi) % (2 * np.pi) - np.pi
+    with np.errstate(invalid="ignore"):
+        bulge = np.sqrt(1 - (away / 0.25) ** 2 - (elevation / 0.2) ** 2)
+    distance = 5 - bulge + 0.06 * np.sin(20 * away) * np.cos(25 * elevation)
+    level = distance * np.cos(elevation)
+    points = [level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)]
+    return organised(np.stack(points, axis=-1), Pose.identity())
+
+
+@pytest.mark.parametrize("up", [1, -1])
+@pytest.mark.parametrize(
+    ("width", "turn"), [(1600, -np.pi), (1600, 0.0), (1595, 0.01), (200, -0.4)]
+)
+def test_scanner_that_turns_is_found_wherever_its_grid_begins(width: int, turn: float, up: int):
+    found = locate_sensor(around(width, turn, up=up))
+    camera = found.camera
+    assert camera is not None and camera.model is CameraModel.SPHERICAL and found.grid is not None
+    rows, columns = np.nonzero(found.grid >= 0)
+    in_sensor = found.sensor_pose.inverse().apply(found.points[found.grid[rows, columns]])
+    pixels, _ = camera.project(in_sensor)
+    assert np.abs(pixels - np.stack([columns, rows], axis=1)).max() < 1e-6
+    assert np.array_equal(found.sensor_pose.translation, np.zeros(3))
+    assert angles_deg(viewing(found), np.array([1.0, 0, 0])) < 1.0
+    prepared = prepare(found, PrepareConfig())
+    assert prepared.image.camera.model is CameraModel.PINHOLE
+
+
+def test_scanner_amid_what_it_saw_is_refused():
+    scan = around(200, -0.4)
+    assert scan.grid is not None
+    wide = np.full((160, 1600), -1)
+    wide[:, :200] = scan.grid
+    wide[:, 800:1000] = np.where(scan.grid >= 0, scan.grid + len(scan.points), -1)
+    both = replace(scan, points=np.concatenate([scan.points, scan.points * (-1, -1, 1)]), grid=wide)
+    with pytest.raises(InputError, match="amid what it saw"):
+        locate_sensor(both)

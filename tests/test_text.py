@@ -1,5 +1,6 @@
 """Points as text: every way to write the same numbers is read alike, or refused with its reason."""
 
+import gzip
 import re
 from pathlib import Path
 
@@ -116,8 +117,12 @@ def test_without_names_only_what_is_certain_is_read(
 def test_pts_has_intensity_before_colours(tmp_path: Path):
     scan = read(tmp_path, "12\n" + table(POINTS, COLORS[:, :1], COLORS), "pts")
     same(scan.colors, COLORS)
-    scan = read(tmp_path, "12\n" + table(POINTS, COLORS[:, :1]), "pts")
-    same(scan.colors, np.repeat(COLORS[:, :1], 3, axis=1))
+    text = "12\n" + table(POINTS, COLORS[:, :1])
+    for scan in (
+        read(tmp_path, text, "pts"),
+        read(tmp_path, gzip.compress(text.encode()), "pts.gz"),
+    ):
+        same(scan.colors, np.repeat(COLORS[:, :1], 3, axis=1))
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,15 @@ def info(options: InfoOptions) -> None:
 
 
 @app.command()
+def formats() -> None:
+    """List the formats of scans that can be read, and what a scan gets from each."""
+    from scanweld.io.scan_formats.registry import format_rows
+
+    for suffixes, title, kept in format_rows():
+        typer.echo(f"{suffixes}\n    {title}\n    kept besides points: {kept}")
+
+
+@app.command()
 def simulate(
     mesh: Annotated[Path, typer.Argument(help="The object: a mesh file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="New folder for the scans.")],

@@ -16,12 +16,13 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import UNCOLORED, TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import natural_key, path_from, write_whole
+from scanweld.io import ScanFile, natural_key, path_from, write_whole
 from scanweld.io.local_origin import about_note, find_shift
 from scanweld.io.mesh_write import glb_bytes, obj_bytes, stl_bytes
 from scanweld.io.ply_write import points_ply_bytes
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan, PoseFormat
 from scanweld.io.pose_formats.records import printed
+from scanweld.io.read import part_names
 from scanweld.preparation.sensor import locate_sensor
 
 _ABOUT_SHIFT = ("model.ply", "model.obj", "model.stl")
@@ -52,13 +53,15 @@ class _Source:
         poses: Of the component's scans, in natural order.
         files: Where their files are, as far as they are needed,
         scans: and what they hold.
+        shared: Files that hold several scans.
         broken: Why others cannot be read, by name.
     """
 
     model: ModelFolder
     poses: Mapping[str, Pose]
-    files: Mapping[str, Path]
+    files: Mapping[str, ScanFile]
     scans: Mapping[str, RangeScan]
+    shared: Collection[Path]
     broken: Mapping[str, ScanweldError]
 
 
@@ -79,7 +82,7 @@ def export(folder: Path, output: Path, wanted: Wanted, *, force: bool = False) -
     model = open_model(folder)
     poses = _component(model, wanted)
     files, missing = _find_files(model, poses, wanted)
-    parts = [folder / "poses.json", *files.values()]
+    parts = [folder / "poses.json", *(file.path for file in files.values())]
     refusals = Refusals()
     with Workspace(output, inputs=parts, force=force) as workspace:
         source = _read(model, poses, files, missing)
@@ -120,7 +123,7 @@ def _component(model: ModelFolder, wanted: Wanted) -> dict[str, Pose]:
 
 def _find_files(
     model: ModelFolder, names: Mapping[str, Pose], wanted: Wanted
-) -> tuple[dict[str, Path], dict[str, InputError]]:
+) -> tuple[dict[str, ScanFile], dict[str, InputError]]:
     """The scans' files, as far as they are needed, and why some are not there."""
     formats = [FORMATS[name] for name in wanted.poses]
     if wanted.points or any(f.needs_files or f.frame is Frame.SENSOR for f in formats):
@@ -131,18 +134,20 @@ def _find_files(
 def _read(
     model: ModelFolder,
     poses: Mapping[str, Pose],
-    files: Mapping[str, Path],
+    files: Mapping[str, ScanFile],
     missing: Mapping[str, ScanweldError],
 ) -> _Source:
     """Read the scans. Formats that only name the files are right for these very ones, too."""
     scans: dict[str, RangeScan] = {}
     broken = dict(missing)
-    for name, path in files.items():
+    for name, file in files.items():
         try:
-            scans |= model.read_whole_scans({name: path})
+            scans |= model.read_whole_scans({name: file})
         except (InputError, ReadError) as error:
             broken[name] = error
-    return _Source(model=model, poses=poses, files=files, scans=scans, broken=broken)
+    paths = {file.path for file in files.values()}
+    shared = {path for path in paths if len(part_names(path)) > 1}
+    return _Source(model=model, poses=poses, files=files, scans=scans, shared=shared, broken=broken)
 
 
 def _render(
@@ -219,11 +224,16 @@ def _posed(
     speaks_of_sensors = form.frame is Frame.SENSOR
     if name in source.broken and (form.needs_files or speaks_of_sensors):
         raise source.broken[name]
+    if form.needs_files and source.files[name].path in source.shared:
+        raise InputError(
+            f"{printed(name)}: shares its file with other scans, which {form.title} cannot tell "
+            "apart; ask for --poses cloudcompare or open3d"
+        )
     located = locate_sensor(source.scans[name]) if speaks_of_sensors else None
     return PosedScan(
         name=name,
         world_from_scan=source.poses[name],
-        file=path_from(output, source.files[name]) if name in source.files else None,
+        file=path_from(output, source.files[name].path) if name in source.files else None,
         camera=None if located is None else located.camera,
         scan_from_sensor=None if located is None else located.scan_from_sensor,
         shift=shift,

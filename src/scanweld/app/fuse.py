@@ -5,7 +5,7 @@ from pathlib import Path
 
 from scanweld.app.cache import FileCache, cache_folder
 from scanweld.app.html_report import write_html_report
-from scanweld.app.job import NO_LIMITS, Limits, read_all, relative_paths
+from scanweld.app.job import NO_LIMITS, Limits, read_all, relative_places
 from scanweld.app.outputs import write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
@@ -73,7 +73,7 @@ def fuse_job(
         with single_threaded_algebra():
             intake = take_in(scans, unreadable, Knowledge(), config, stages)
             result = _fuse(intake, known, found, without, config, stages)
-        write_outputs(result, workspace.staging, relative_paths(files, workspace.output))
+        write_outputs(result, workspace.staging, relative_places(files, workspace.output))
         with telling(progress, "report"):
             write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()

@@ -11,7 +11,7 @@ from scanweld.app.frame_files import write_frames
 from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
-from scanweld.app.outputs import write_outputs
+from scanweld.app.outputs import Place, write_outputs
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
@@ -97,7 +97,7 @@ def run_job(
             cache=cache,
             progress=progress,
         )
-        places = relative_paths(files, workspace.output)
+        places = relative_places(files, workspace.output)
         write_outputs(result, workspace.staging, places, max_points)
         write_frames(files, workspace.staging, workspace.output)
         with telling(progress, "report"):
@@ -116,9 +116,12 @@ def _runner(scheduler: str | None) -> AbstractContextManager[Runner | None]:
     return Cluster(scheduler)
 
 
-def relative_paths(files: Sequence[ScanFile], folder: Path) -> dict[str, str]:
-    """Where each scan's file is, by the scan's name, as seen from a folder."""
-    return {file.name: printable(path_from(folder, file.path)) for file in files}
+def relative_places(files: Sequence[ScanFile], folder: Path) -> dict[str, Place]:
+    """Where each scan is, by the scan's name: its file as seen from a folder, and its part."""
+    return {
+        file.name: Place(file=printable(path_from(folder, file.path)), part=file.part)
+        for file in files
+    }
 
 
 def read_all(

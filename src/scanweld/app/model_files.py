@@ -20,15 +20,17 @@ class Entry(BaseModel):
 
 
 class FileEntry(Entry):
-    """Where a scan's file is, as seen from the folder, and the hash of the scan's content.
+    """Where a scan is, as seen from the folder, and the hash of its content.
 
     Attributes:
         file: None where it is unknown.
+        part: Which of the file's scans it is, from 0.
         content_hash: Of the scan, after the cut; None if it could not be read.
         kept: What the cut kept, as ``ScanReport`` has it.
     """
 
     file: str | None = None
+    part: int = 0
     content_hash: str | None = None
     kept: str | None = None
 

@@ -12,8 +12,9 @@ from scanweld.cut import mask_of, with_only
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
-from scanweld.io import PoseSet, collect, read_mesh, read_poses, read_scan
-from scanweld.io.depth.frame import FrameSettings, read_frame
+from scanweld.io import PoseSet, ScanFile, collect, printable, read_mesh, read_poses
+from scanweld.io.depth.capture import Frame
+from scanweld.io.depth.frame import FrameSettings
 from scanweld.io.depth.images import depth_images, image_names
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.thinning import thinned
@@ -88,7 +89,9 @@ class ModelFolder:
         settings = self.path / "config.toml"
         return load_config(settings).unit if settings.is_file() else None
 
-    def scan_files(self, names: Iterable[str], given: Sequence[Path | str] = ()) -> dict[str, Path]:
+    def scan_files(
+        self, names: Iterable[str], given: Sequence[Path | str] = ()
+    ) -> dict[str, ScanFile]:
         """Where the files of some scans are: among those given, else where the report says.
 
         Args:
@@ -106,23 +109,23 @@ class ModelFolder:
 
     def find_files(
         self, names: Iterable[str], given: Sequence[Path | str] = ()
-    ) -> tuple[dict[str, Path], dict[str, InputError]]:
+    ) -> tuple[dict[str, ScanFile], dict[str, InputError]]:
         """The same, and of each scan whose file is not there, why that is so."""
         known = self._given_files(given) if given else self._told_files()
-        found: dict[str, Path] = {}
+        found: dict[str, ScanFile] = {}
         missing: dict[str, InputError] = {}
         for name in names:
-            if name in known and known[name].is_file():
+            if name in known and known[name].path.is_file():
                 found[name] = known[name]
                 continue
-            place = f" ({known[name]})" if name in known else ""
+            place = f" ({known[name].path})" if name in known else ""
             where = "among the scans given" if given else f"where the model says{place}"
             missing[name] = InputError(
                 f"{printed(name)}: its file is not {where}; name all scans with --scans"
             )
         return found, missing
 
-    def read_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+    def read_scans(self, files: Mapping[str, ScanFile]) -> dict[str, RangeScan]:
         """Scans as the model's maker took them: thinned where it had to save memory, not yet cut.
 
         Args:
@@ -132,16 +135,16 @@ class ModelFolder:
             InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        return {name: self._as_taken(self._read(name, path)) for name, path in files.items()}
+        return {name: self._as_taken(file.read()) for name, file in files.items()}
 
-    def read_whole_scans(self, files: Mapping[str, Path]) -> dict[str, RangeScan]:
+    def read_whole_scans(self, files: Mapping[str, ScanFile]) -> dict[str, RangeScan]:
         """The same with all of their points, but for what was cut off.
 
         Raises:
             InputError: If one of them is not what the model was made of.
             ReadError: If one of them, or the report, is broken.
         """
-        scans = {name: self._read(name, path) for name, path in files.items()}
+        scans = {name: file.read() for name, file in files.items()}
         for scan in scans.values():
             self._as_taken(scan)
         return {name: self.cut(scan) for name, scan in scans.items()}
@@ -168,10 +171,6 @@ class ModelFolder:
         except ValueError as error:
             raise InputError(f"{error}; give the same files") from error
 
-    def _read(self, name: str, path: Path) -> RangeScan:
-        settings = self._frames.get(name)
-        return read_scan(path, name) if settings is None else read_frame(path, name, settings)
-
     def _as_taken(self, scan: RangeScan) -> RangeScan:
         """A scan as the model's maker took it, after making sure that it is the same one."""
         most, told = self._files.max_points, self._files.scans.get(scan.name)
@@ -192,15 +191,29 @@ class ModelFolder:
         report = self.path / "report.json"
         return read_entries(report, Files) if report.is_file() else Files(scans={})
 
-    def _given_files(self, given: Sequence[Path | str]) -> Mapping[str, Path]:
+    def _given_files(self, given: Sequence[Path | str]) -> Mapping[str, ScanFile]:
         if not self._frames:
-            return {file.name: file.path for file in collect(given)}
+            return {file.name: file for file in collect(given)}
         images = depth_images(given)
-        return dict(zip(image_names(images), images, strict=True))
+        names = [printable(name) for name in image_names(images)]
+        return {
+            name: self._file(path, name)
+            for path, name in zip(images, names, strict=True)
+            if name in self._frames
+        }
 
-    def _told_files(self) -> Mapping[str, Path]:
-        scans = self._files.scans
-        return {name: self.path / scan.file for name, scan in scans.items() if scan.file}
+    def _told_files(self) -> Mapping[str, ScanFile]:
+        return {
+            name: self._file(self.path / scan.file, name, scan.part)
+            for name, scan in self._files.scans.items()
+            if scan.file
+        }
+
+    def _file(self, path: Path, name: str, part: int = 0) -> ScanFile:
+        settings = self._frames.get(name)
+        if settings is None:
+            return ScanFile(path=path, name=name, part=part)
+        return Frame(path=path, name=name, settings=settings)
 
 
 def open_model(path: Path, result: Reconstruction | None = None) -> ModelFolder:

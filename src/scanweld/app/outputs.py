@@ -1,7 +1,7 @@
 """What a run writes: poses.json, graph.json, report.json, config.toml, model.ply or preview.ply."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,18 @@ PREVIEW_COMMENT = "preview of doubtful scans, not a model: their poses may be wr
 Json = Mapping[str, Any]
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Place:
+    """Where a scan is: its file, as seen from the model's folder, and which of the file's scans."""
+
+    file: str
+    part: int = 0
+
+
 def write_outputs(
     result: Reconstruction,
     folder: Path,
-    files: Mapping[str, str] | None = None,
+    places: Mapping[str, Place] | None = None,
     max_points: int | None = None,
 ) -> None:
     """Write everything a run found out into a folder.
@@ -32,7 +40,7 @@ def write_outputs(
         result: What the run found out.
         folder: An existing folder. There is no model.ply where there is no mesh, but preview.ply
             where all scans are doubtful.
-        files: Where each scan's file is, as seen from the folder's final place.
+        places: Where each scan is, as seen from the folder's final place.
         max_points: To how many points scans were thinned at most, if they were.
 
     Raises:
@@ -43,7 +51,7 @@ def write_outputs(
     )
     write_poses(folder / "poses.json", poses)
     write_whole(folder / "graph.json", json_text(graph_json(result)).encode())
-    report = report_json(result, files, max_points)
+    report = report_json(result, places, max_points)
     write_whole(folder / "report.json", json_text(report).encode())
     write_whole(folder / "config.toml", result.config.to_toml().encode())
     if result.mesh is not None:
@@ -59,11 +67,11 @@ def graph_json(result: Reconstruction) -> Json:
 
 def report_json(
     result: Reconstruction,
-    files: Mapping[str, str] | None = None,
+    places: Mapping[str, Place] | None = None,
     max_points: int | None = None,
 ) -> Json:
     """The verdict, as a whole and scan by scan, the stages' costs and the settings."""
-    files = files or {}
+    places = places or {}
     names = sorted(result.scans, key=natural_key)
     facts = [asdict(fact) for fact in result.knowledge]
     mesh = result.mesh or result.preview
@@ -78,10 +86,16 @@ def report_json(
         **({} if result.sensor is None else {"sensor": _sensor(result.sensor)}),
         **({} if shift is None else {"shift": shift.tolist()}),
         **({} if result.preview is None else {"preview": PREVIEW}),
-        "scans": {name: asdict(result.scans[name]) | {"file": files.get(name)} for name in names},
+        "scans": {name: asdict(result.scans[name]) | _place(places.get(name)) for name in names},
         "stages": {name: _stage(stage) for name, stage in result.stages.items()},
         "settings": result.config.model_dump(mode="json"),
     }
+
+
+def _place(place: Place | None) -> dict[str, Any]:
+    if place is None:
+        return {"file": None}
+    return {"file": place.file} | ({"part": place.part} if place.part else {})
 
 
 def _pair(pair: PairReport) -> Json:

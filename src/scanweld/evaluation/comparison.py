@@ -12,7 +12,7 @@ from scanweld.evaluation.metrics import (
     Standing,
     evaluate,
 )
-from scanweld.io import collect, natural_key, read_poses, read_scan
+from scanweld.io import collect, natural_key, read_poses
 
 
 def compare(
@@ -33,10 +33,10 @@ def compare(
     found = read_poses(estimate)
     if not scans:
         return evaluate(found, reference)
-    files = {file.name: file.path for file in collect(scans) if file.name in reference}
+    files = {file.name: file for file in collect(scans) if file.name in reference}
     if missing := sorted(set(reference) & set(found.poses) - set(files), key=natural_key):
         raise InputError(f"{missing[0]}: has a pose but is not among the scans given")
-    read = [read_scan(path, name) for name, path in files.items()]
+    read = [file.read() for file in files.values()]
     return evaluate(found, reference, read)
 
 

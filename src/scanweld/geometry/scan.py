@@ -35,6 +35,8 @@ class RangeScan:
         camera: Intrinsics, or None where unknown. With a grid, its pixels are the grid's cells.
         scan_from_sensor: Where the sensor stood; None where unknown. A scan with an orthographic
             camera, or without a camera, uses of it only the viewing direction (its z axis).
+        world_from_scan: Where the file says the scan belongs, in a frame that its scans share; or
+            None. Nothing is believed of it, and it is no part of the content.
         viewpoint: How scan_from_sensor is known.
         num_dropped: NaN and infinite points that were left out on reading.
         notes: What was assumed about this scan, in words, for the report.
@@ -52,6 +54,7 @@ class RangeScan:
     confidence: FloatArray | None = None
     camera: Camera | None = None
     scan_from_sensor: Pose | None = None
+    world_from_scan: Pose | None = None
     viewpoint: Viewpoint = Viewpoint.UNKNOWN
     num_dropped: int = 0
     notes: tuple[str, ...] = field(default=())

@@ -9,22 +9,27 @@ from pathlib import Path, PurePath
 
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
-from scanweld.io.names import natural_key, printable
+from scanweld.io.names import natural_key, printable, stem_of, suffix_of
 from scanweld.io.not_scans import foreign_kind, inventory, why_unread
-from scanweld.io.read import READERS, read_scan
+from scanweld.io.read import part_names, read_scan
+from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
 
 logger = logging.getLogger(__name__)
-
-_ONLY_WHEN_NAMED = frozenset({".txt", ".csv"})
-"""Found in a folder these are more often a README or a table than a scan: they must be named."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScanFile:
-    """A file to be read as a scan, and the scan's name, unique in the run."""
+    """A scan of a file, to be read.
+
+    Attributes:
+        path: Of the file.
+        name: The scan's, unique in the run.
+        part: Which of the file's scans it is, from 0.
+    """
 
     path: Path
     name: str
+    part: int = 0
 
     def read(self) -> RangeScan:
         """Read the scan.
@@ -32,18 +37,21 @@ class ScanFile:
         Raises:
             ReadError: If it cannot be read.
         """
-        return read_scan(self.path, self.name)
+        return read_scan(self.path, self.name, part=self.part)
 
 
 def collect(inputs: Sequence[Path | str]) -> tuple[ScanFile, ...]:
     """The scans that folders, glob patterns and files name, in natural order of their paths.
 
     Of a folder (not those inside it) and of a pattern, hidden files and files of unknown formats
-    are left out; ``.txt`` and ``.csv`` count only when named, or by a pattern that ends so. The
-    files themselves are not opened. A file that is named twice counts once.
+    are left out; some formats, such as ``.txt`` and ``.csv``, count only when named, or by a
+    pattern that ends so. Only files that may hold several scans are opened. A file that is named
+    twice counts once.
 
     Names are the files' stems; if two share one, all names become paths relative to the common
-    parent, without suffix unless that is needed to tell them apart.
+    parent, without suffix unless that is needed to tell them apart. Several scans of one file are
+    called as the file calls them, or ``stem_1``, ``stem_2``; if that is another scan's name too,
+    ``stem.suffix/1`` and so on.
 
     Raises:
         ReadError: If a named file is missing or of an unknown format.
@@ -53,37 +61,55 @@ def collect(inputs: Sequence[Path | str]) -> tuple[ScanFile, ...]:
         raise InputError("no scans given; name a folder or files")
     found = {Path(os.path.abspath(path)): path for each in inputs for path in _expand(each)}
     absolute = sorted(found, key=lambda path: natural_key(path.as_posix()))
+    stems = dict(zip(absolute, _unique_names(absolute), strict=True))
+    parts = [(path, k, own) for path in absolute for k, own in enumerate(_own_names(path))]
+    names = [own or stems[path] for path, _, own in parts]
+    if len(set(names)) < len(names):
+        # A file is no folder, too: this can be no other scan's name.
+        names = [
+            f"{stems[path].removesuffix(path.suffix)}{path.suffix}/{k + 1}" if own else stems[path]
+            for path, k, own in parts
+        ]
     return tuple(
-        ScanFile(path=found[path], name=printable(name))
-        for path, name in zip(absolute, _unique_names(absolute), strict=True)
+        ScanFile(path=found[path], name=printable(name), part=k)
+        for (path, k, _), name in zip(parts, names, strict=True)
     )
+
+
+def _own_names(path: Path) -> list[str]:
+    """Of the scans of a file, numbered where it has no names for them; empty if it has but one."""
+    names = part_names(path)
+    if len(names) == 1:
+        return [""]
+    return [name or f"{stem_of(path)}_{k}" for k, name in enumerate(names, start=1)]
 
 
 def _expand(each: Path | str) -> list[Path]:
     path = Path(each)
     if path.is_dir():
         try:
-            return _scans_among(sorted(path.iterdir()), f"{path}: the folder", _ONLY_WHEN_NAMED)
+            return _scans_among(sorted(path.iterdir()), f"{path}: the folder")
         except OSError as error:
             raise ReadError(f"{path}: cannot be listed ({error.strerror}); check it") from error
     if not path.exists() and glob.has_magic(str(each)):
         matches = [Path(match) for match in sorted(glob.glob(str(each)))]
-        return _scans_among(
-            matches, f"{each}: the pattern", _ONLY_WHEN_NAMED - {path.suffix.lower()}
-        )
+        return _scans_among(matches, f"{each}: the pattern", suffix_of(path))
     if not path.exists():
         raise ReadError(f"{path}: there is no such file; check the path")
-    if path.suffix.lower() not in READERS:
-        raise ReadError(why_unread(path, READERS))
+    if format_of(path) is None:
+        raise ReadError(why_unread(path, formats_by_suffix()))
     return [path]
 
 
-def _scans_among(candidates: list[Path], where: str, left_out: frozenset[str]) -> list[Path]:
-    known = READERS.keys() - left_out
+def _scans_among(candidates: list[Path], where: str, named: str = "") -> list[Path]:
+    """Those of the files that are scans, and whose suffix need not be named, or is."""
+    only_named = {suffix for form in formats_by_suffix().values() for suffix in form.only_named}
+    left_out = frozenset(only_named - {named})
+    known = [suffix for suffix in formats_by_suffix() if suffix not in left_out]
     scans: list[Path] = []
     others: list[Path] = []
     for path in candidates:
-        is_scan = path.suffix.lower() in known and not path.name.startswith(".")
+        is_scan = suffix_of(path) in known and not path.name.startswith(".")
         is_dangling = path.is_symlink() and not path.exists()
         if is_scan and (path.is_file() or is_dangling):  # the reader says what is wrong with it
             scans.append(path)
@@ -91,8 +117,8 @@ def _scans_among(candidates: list[Path], where: str, left_out: frozenset[str]) -
             others.append(path)
     found = inventory(others, left_out)
     if not scans:
-        formats = ", ".join(suffix for suffix in READERS if suffix in known)
         told = f", but {found}" if found else ""
+        formats = ", ".join(known)
         raise InputError(f"{where} holds no scans{told}; scanweld looks for {formats} there")
     if found:
         is_meant = any(foreign_kind(path) is not None for path in others)
@@ -101,10 +127,10 @@ def _scans_among(candidates: list[Path], where: str, left_out: frozenset[str]) -
 
 
 def _unique_names(paths: list[Path]) -> list[str]:
-    stems = [path.stem for path in paths]
+    stems = [stem_of(path) for path in paths]
     if len(set(stems)) == len(stems):
         return stems
     parent = os.path.commonpath([path.parent for path in paths])
     relative = [PurePath(os.path.relpath(path, parent)) for path in paths]
-    short = [path.with_suffix("").as_posix() for path in relative]
+    short = [path.with_name(stem_of(path)).as_posix() for path in relative]
     return short if len(set(short)) == len(short) else [path.as_posix() for path in relative]

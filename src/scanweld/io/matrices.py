@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 
 
@@ -24,3 +25,16 @@ def pose_from_numbers(numbers: Sequence[float]) -> Pose:
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-14:
         return pose
     return Pose(rotation=rotation, translation=matrix[:3, 3])
+
+
+def rotation_of_quaternion(xyzw: FloatArray) -> FloatArray:
+    """The rotation (3, 3) of a quaternion (4,) x y z w of any length; none if it is zero."""
+    length = float(np.linalg.norm(xyzw))
+    x, y, z, w = xyzw / length if 0 < length < np.inf else (0.0, 0.0, 0.0, 1.0)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -2,7 +2,7 @@
 
 import os
 import re
-from pathlib import Path
+from pathlib import Path, PurePath
 
 
 def natural_key(text: str) -> tuple[list[str | int], str]:
@@ -23,3 +23,18 @@ def path_from(folder: Path, path: Path) -> str:
         return Path(os.path.relpath(whole, folder)).as_posix()
     except ValueError:  # Windows, another drive
         return Path(whole).as_posix()
+
+
+def suffix_of(path: PurePath) -> str:
+    """The suffix that tells a file's format, in lower case: that before a ``.gz``."""
+    return (PurePath(path.stem) if is_gzipped(path) else path).suffix.lower()
+
+
+def stem_of(path: PurePath) -> str:
+    """The file's name without that suffix, and without ``.gz``."""
+    return PurePath(path.stem).stem if is_gzipped(path) else path.stem
+
+
+def is_gzipped(path: PurePath) -> bool:
+    """Whether a file is packed as a whole, by its name."""
+    return path.suffix.lower() == ".gz"

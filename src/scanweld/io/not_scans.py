@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scanweld.io.names import natural_key, printable
+from scanweld.io.names import natural_key, printable, suffix_of
 
 _MAX_GROUPS = 8
 """Kinds of files that a message names."""
@@ -57,7 +57,7 @@ FOREIGN = (
 
 def foreign_kind(path: Path) -> Foreign | None:
     """What kind of file it is, if that is known to be none that can be read."""
-    suffix = path.suffix.lower()
+    suffix = suffix_of(path)
     return next((kind for kind in FOREIGN if suffix in kind.suffixes), None)
 
 
@@ -84,7 +84,7 @@ def inventory(paths: Sequence[Path], only_named: frozenset[str]) -> str:
     groups: dict[str, list[Path]] = {}
     for path in sorted(paths, key=lambda path: natural_key(path.name)):
         if not path.name.startswith("."):
-            suffix = path.suffix.lower() or path.name
+            suffix = suffix_of(path) or path.name
             kind = "folders" if path.is_dir() and foreign_kind(path) is None else suffix
             groups.setdefault(kind, []).append(path)
     # What might have been meant comes first.

@@ -17,6 +17,7 @@ SCALAR_TYPES = {
 }
 """Both spellings of every scalar type -> NumPy's code without the byte order."""
 _FIRST_LINE = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
+_COUNT = re.compile(r"[0-9]{1,15}")
 FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 
 
@@ -94,7 +95,8 @@ def parse_header(path: Path, data: bytes) -> PlyHeader:
         elif keyword == "property":
             if not elements:
                 raise ReadError(f"{path}: '{line}' stands before any element; export the file anew")
-            elements[-1][2].append(_property(path, line, words))
+            known = elements[-1][2]
+            known.append(_property(path, line, words, {prop.name for prop in known}))
         elif keyword:
             logger.debug("%s: header line %r skipped", path, line)
     if form not in FORMATS:
@@ -135,15 +137,18 @@ def _header_lines(path: Path, data: bytes) -> tuple[list[str], int]:
 
 
 def _element(path: Path, line: str, words: list[str]) -> tuple[str, int, list[PlyProperty]]:
-    if len(words) != 2 or not words[1].isdecimal():
+    if len(words) != 2 or not _COUNT.fullmatch(words[1]):
         raise ReadError(f"{path}: '{line}' is not 'element NAME COUNT'; export the file anew")
     return words[0], int(words[1]), []
 
 
-def _property(path: Path, line: str, words: list[str]) -> PlyProperty:
+def _property(path: Path, line: str, words: list[str], taken: set[str]) -> PlyProperty:
+    """A property, its name in small letters unless one of the element's is called so."""
+    name = words[-1].lower() if words else ""
+    name = words[-1] if name in taken else name
     types = [SCALAR_TYPES.get(word) for word in words[:-1]]
     if len(words) == 2 and types[0] is not None:
-        return PlyProperty(name=words[1], type=types[0])
+        return PlyProperty(name=name, type=types[0])
     if len(words) == 4 and words[0] == "list" and types[1] is not None and types[2] is not None:
-        return PlyProperty(name=words[3], type=types[2], count_type=types[1])
+        return PlyProperty(name=name, type=types[2], count_type=types[1])
     raise ReadError(f"{path}: '{line}' is not a property of a known type; export the file anew")

@@ -13,7 +13,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io.atomic import write_whole
 from scanweld.io.local_origin import find_shift, shift_text
-from scanweld.io.ply import CAMERA_KEY, POSE_KEY
+from scanweld.io.scan_formats.ply import CAMERA_KEY, POSE_KEY
 
 _TYPE_NAMES = {"<f4": "float", "<f8": "double", "|u1": "uchar", "<i4": "int"}
 

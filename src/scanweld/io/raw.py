@@ -1,6 +1,7 @@
 """What every reader hands over, and how it becomes a scan or a mesh."""
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from scanweld.io.coarseness import refuse_coarse
 from scanweld.io.no_points import grid_in_order, seen_points
 
 logger = logging.getLogger(__name__)
+
+POSE_NOTE = "the file has a pose for the scan, which is tried besides others but not believed"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -40,6 +43,7 @@ class RawScan:
     filled: FloatArray | None = None
     camera: Camera | None = None
     scan_from_sensor: Pose | None = None
+    world_from_scan: Pose | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -84,6 +88,8 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
         notes += ("intensity read as grey",)
     if grid is not None and (loose := _num_loose(grid, int(seen.sum()))):
         notes += (f"{loose} points lie in no cell of the grid",)
+    if raw.world_from_scan is not None and not _is_identity(raw.world_from_scan):
+        notes += (POSE_NOTE,)
     if dropped:
         logger.info("%s: %d points dropped", path, dropped)
     return RangeScan(
@@ -96,6 +102,7 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
         confidence=None if raw.confidence is None else _zero_unless_finite(raw.confidence[seen]),
         camera=raw.camera,
         scan_from_sensor=raw.scan_from_sensor,
+        world_from_scan=raw.world_from_scan,
         viewpoint=Viewpoint.UNKNOWN if raw.scan_from_sensor is None else Viewpoint.GIVEN,
         num_dropped=dropped,
         notes=notes,
@@ -124,6 +131,19 @@ def to_mesh(path: Path, raw: RawScan) -> TriangleMesh:
         stdev=None if raw.stdev is None else raw.stdev[finite],
         filled=None if raw.filled is None else raw.filled[finite] > 0,
     )
+
+
+def full_grid(rows: int, columns: int) -> IntArray:
+    """The grid (rows, columns) of points that stand in its order; those that are NaN leave it."""
+    return np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+
+
+def side_by_side(columns: Sequence[NDArray]) -> FloatArray:
+    """Columns (N,) of any types as one table (N, k)."""
+    values = np.empty((len(columns[0]), len(columns)))
+    for k, column in enumerate(columns):
+        values[:, k] = column
+    return values
 
 
 def fan_triangles(counts: IntArray, corners: IntArray) -> IntArray:
@@ -173,6 +193,10 @@ def _check_indices(path: Path, raw: RawScan) -> None:
                     f"{path}: its {what} name point {index}, but points go from 0 to "
                     f"{len(raw.points) - 1}; export it anew"
                 )
+
+
+def _is_identity(pose: Pose) -> bool:
+    return bool(np.array_equal(pose.matrix(), np.eye(4)))
 
 
 def _whole(faces: IntArray) -> IntArray:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.collect import collect
-from scanweld.io.read import read_scan
 
 
 def read_scans(inputs: Path | str | Sequence[Path | str]) -> list[RangeScan]:
@@ -15,4 +14,4 @@ def read_scans(inputs: Path | str | Sequence[Path | str]) -> list[RangeScan]:
         ScanweldError: If there are none, or one cannot be read.
     """
     named = [inputs] if isinstance(inputs, Path | str) else inputs
-    return [read_scan(file.path, file.name) for file in collect(named)]
+    return [file.read() for file in collect(named)]

@@ -7,6 +7,7 @@ import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
+from scanweld.io.names import suffix_of
 from scanweld.io.text_columns import FIRST_ROWS, INDEX_NOTE, Columns, is_index
 
 _MOST_COLUMNS = 12
@@ -29,7 +30,7 @@ def columns_by_values(path: Path, table: FloatArray) -> Columns:
         )
     places = range(first + 3, width)
     notes = [INDEX_NOTE] if first else []
-    if path.suffix.lower() == ".pts" and len(places) in (1, 4):
+    if suffix_of(path) == ".pts" and len(places) in (1, 4):
         colors = tuple(places[1:]) if len(places) == 4 and _are_colors(table[:, -3:]) else ()
         return Columns(points=tuple(range(first, first + 3)), colors=colors, intensity=(places[0],))
     normals = _only(table, places, _are_unit_vectors)

@@ -96,10 +96,16 @@ class Knowledge:
     def _starts(
         self, prepared: Sequence[PreparedScan], index: dict[str, int]
     ) -> dict[tuple[int, int], Pose]:
-        """Start poses between the sensors of all pairs that share a frame in the file."""
+        """Start poses between the sensors of all pairs that share a frame in the file.
+
+        Where none are given, those that the scans' own files have: they are tried, not reported.
+        """
         starts = {}
-        poses = self.start.poses if self.start is not None else {}
-        for component in self.start.components if self.start is not None else ():
+        told = {scan.name: scan.scan.world_from_scan for scan in prepared}
+        own = {name: pose for name, pose in told.items() if pose is not None}
+        poses = self.start.poses if self.start is not None else own
+        are_apart = any(pose.angle_deg() > 0 or pose.translation.any() for pose in own.values())
+        for component in self.start.components if self.start is not None else [own] * are_apart:
             there = sorted(index[name] for name in component if name in index)
             sensors = {k: poses[prepared[k].name] @ prepared[k].scan_from_sensor for k in there}
             for i, j in combinations(there, 2):

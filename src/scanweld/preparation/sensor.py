@@ -19,6 +19,7 @@ from scanweld.preparation.camera_fit import (
 from scanweld.preparation.line_scanner import line_of_sight
 from scanweld.preparation.resolution import point_spacing
 from scanweld.preparation.sensor_side import find_side
+from scanweld.preparation.spherical_fit import fit_spherical
 from scanweld.preparation.viewpoint import (
     depth_image,
     line_of_sight_of_points,
@@ -60,13 +61,14 @@ COMPLETE_NOTE = (
 def locate_sensor(scan: RangeScan) -> RangeScan:
     """The scan with its sensor: as given, fitted to the grid, or estimated from the surface.
 
-    An organised grid gets the pinhole or orthographic camera that reproduces it to a fraction of
-    a pixel; if no such camera exists (line scanners), only its viewing direction is found, and the
-    sensor is put well before the object. The same holds for meshes and points without a grid. A
-    grid that mirrors its camera's image comes back with its rows reversed.
+    An organised grid gets the pinhole, orthographic or spherical camera that reproduces it to a
+    fraction of a pixel; if no such camera exists (line scanners), only its viewing direction is
+    found, and the sensor is put well before the object. The same holds for meshes and points
+    without a grid. A grid that mirrors its camera's image comes back with its rows reversed.
 
     Raises:
-        InputError: If there are fewer than 50 points, or if all of them lie on one line.
+        InputError: If there are fewer than 50 points, if all of them lie on one line, or if a
+            spherical scanner stood amid them.
     """
     _check_usable(scan)
     if scan.scan_from_sensor is not None:
@@ -128,21 +130,38 @@ def _from_grid(scan: RangeScan) -> RangeScan | None:
         return None
     sight = line_of_sight(points, pixels)
     if sight.misfit > MAX_MISFIT:
-        return None
+        return _from_angles(scan)
     axis, notes = sight.axis, ()
     if not sight.has_side:
         depth = np.where(scan.grid >= 0, (scan.points @ axis)[scan.grid], np.nan)
         axis, notes = _sided(scan, axis, depth, sight.pitch)
     height, width = scan.grid.shape
     fit = _simplest_camera(points, pixels, (height, width), axis)
+    turning = _from_angles(scan, fit)
+    if turning is not None:
+        return turning
     if fit and fit.camera.model is CameraModel.PINHOLE:
         return _with_camera(scan, fit)
     if fit:
         return _with_camera(scan, fit, *notes)
     if sight.is_oblique:
         notes = (OBLIQUE_NOTE, *notes)
-    note = "no pinhole or orthographic camera fits the grid; its line of sight was fitted"
+    note = "no camera fits the grid; its line of sight was fitted"
     return _with_direction(scan, axis, sight.right, Viewpoint.FITTED, note, *notes)
+
+
+def _from_angles(scan: RangeScan, other: CameraFit | None = None) -> RangeScan | None:
+    """The scan with a spherical camera, if its grid shows one clearly better than another camera.
+
+    A pinhole comes near it where the scan is narrow, but stands elsewhere.
+    """
+    if other is not None and other.rms < SAME_RMS_PIXELS:
+        return None
+    found = fit_spherical(scan)
+    if found is None or (other is not None and SAME_RMS_RATIO * found[0].rms > other.rms):
+        return None
+    fit, grid = found
+    return _with_camera(replace(scan, grid=grid), fit)
 
 
 def _simplest_camera(

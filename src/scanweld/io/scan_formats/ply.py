@@ -1,7 +1,7 @@
-"""PLY files as range scans and meshes: what their elements and properties mean."""
+"""PLY of Stanford, ASCII or binary: points, range grids and meshes, with a sensor's place."""
 
 import logging
-from collections.abc import Sequence
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,9 @@ from scanweld.geometry.pose import Pose
 from scanweld.io.matrices import pose_from_numbers
 from scanweld.io.ply_body import Columns, Ragged, decode_body
 from scanweld.io.ply_header import PlyElement, PlyHeader, parse_header
-from scanweld.io.raw import RawScan, fan_triangles, to_bytes
+from scanweld.io.raw import RawScan, fan_triangles, full_grid, side_by_side, to_bytes
+from scanweld.io.scan_formats.records import Keeps, ScanFormat
+from scanweld.io.viewed_from import viewpoint_told
 
 logger = logging.getLogger(__name__)
 
@@ -30,6 +32,9 @@ _COLORS = (
 )
 _LARGEST_INDEX = 2**53
 """Above this a double, as which the numbers of ASCII files are read, is not exact."""
+_SHORT_NUMBER = re.compile(r"[0-9]{1,9}")
+_PLACE = ("view_px", "view_py", "view_pz")
+_AXES = tuple(f"{axis}_axis{part}" for axis in "xyz" for part in "xyz")
 _INDEX_LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -59,6 +64,10 @@ def read_ply(path: Path, data: bytes) -> RawScan:
             f"{path}: the camera in its obj_info has {camera.width} x {camera.height} pixels, the "
             f"range grid {grid.shape[1]} x {grid.shape[0]} cells; correct either"
         )
+    pose = _sensor_pose(header)
+    if pose is None and grid is None:
+        pose, told = _seen_from(tables.get("camera", {}), points)
+        notes += told
     intensity = _bytes(path, element, vertex, ("intensity",))
     return RawScan(
         points=points,
@@ -72,7 +81,7 @@ def read_ply(path: Path, data: bytes) -> RawScan:
         stdev=_column(vertex, "stdev"),
         filled=_column(vertex, "filled"),
         camera=camera,
-        scan_from_sensor=_sensor_pose(header),
+        scan_from_sensor=pose,
         notes=notes,
     )
 
@@ -80,7 +89,7 @@ def read_ply(path: Path, data: bytes) -> RawScan:
 def _stack(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
     """Scalar columns side by side (N, k), or None if one is missing."""
     found = _scalars(columns, names)
-    return None if found is None else _doubles(found)
+    return None if found is None else side_by_side(found)
 
 
 def _column(columns: Columns, name: str) -> FloatArray | None:
@@ -96,14 +105,6 @@ def _scalars(columns: Columns, names: tuple[str, ...]) -> list[NDArray] | None:
     return scalars if len(scalars) == len(names) else None
 
 
-def _doubles(columns: Sequence[NDArray]) -> FloatArray:
-    """Columns side by side (N, k)."""
-    values = np.empty((len(columns[0]), len(columns)))
-    for k, column in enumerate(columns):
-        values[:, k] = column
-    return values
-
-
 def _bytes(
     path: Path, element: PlyElement, columns: Columns, names: tuple[str, ...]
 ) -> ByteArray | None:
@@ -114,7 +115,7 @@ def _bytes(
         return None
     if all(types[name] == "u1" for name in names):
         return np.stack(found, axis=1)
-    scaled = to_bytes(_doubles(found), types[names[0]])
+    scaled = to_bytes(side_by_side(found), types[names[0]])
     if scaled is None:
         logger.warning("%s: %s are on no known scale, so they are left out", path, ", ".join(names))
     return scaled
@@ -144,12 +145,12 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
     """The range grid (rows, columns) of vertex indices, -1 where a cell is empty."""
     element = header.element("range_grid")
     if element is None or element.count == 0:
-        return None, ()
+        return _grid_of_all(header), ()
     cells = _index_list(header.path, tables["range_grid"])
     if cells is None:
         raise ReadError(f"{header.path}: its range_grid has no list vertex_indices; export it anew")
     shape = (header.info.get("num_rows", ""), header.info.get("num_cols", ""))
-    if not all(text.isdecimal() for text in shape):
+    if not all(_SHORT_NUMBER.fullmatch(text) for text in shape):
         logger.warning("%s: range_grid without num_rows and num_cols, left out", header.path)
         return None, ("range grid of unknown shape left out",)
     rows, columns = (int(text) for text in shape)
@@ -166,6 +167,17 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
     grid = np.full((rows, columns), -1, dtype=np.int64)
     grid.reshape(-1)[counts == 1] = values
     return grid, ()
+
+
+def _grid_of_all(header: PlyHeader) -> IntArray | None:
+    """The grid of vertices that stand in its order, NaN where nothing was seen, as PCL writes."""
+    shape = [header.info.get(key, "") for key in ("num_rows", "num_cols")]
+    vertex = header.element("vertex")
+    if vertex is None or not all(_SHORT_NUMBER.fullmatch(text) for text in shape):
+        return None
+    rows, columns = (int(text) for text in shape)
+    fits = rows * columns == vertex.count and min(rows, columns) > 1
+    return full_grid(rows, columns) if fits else None
 
 
 def _faces(header: PlyHeader, tables: dict[str, Columns]) -> IntArray | None:
@@ -192,6 +204,19 @@ def _camera(header: PlyHeader) -> Camera | None:
         ) from error
 
 
+def _seen_from(columns: Columns, points: FloatArray) -> tuple[Pose | None, tuple[str, ...]]:
+    """The sensor at the place of the element ``camera``, and notes on it.
+
+    PCL and MeshLab (VCG) mean opposite directions by its axes, so only its place is believed; and
+    that not if it is the origin with axes as they are, which PCL writes where it knows nothing.
+    """
+    place, axes = _stack(columns, _PLACE), _stack(columns, _AXES)
+    if place is None or len(place) != 1:
+        return None, ()
+    told = () if axes is None else axes[0]
+    return viewpoint_told(points, place[0], np.array_equal(told, np.eye(3).ravel()), "camera")
+
+
 def _sensor_pose(header: PlyHeader) -> Pose | None:
     text = header.info.get(POSE_KEY)
     if text is None:
@@ -203,3 +228,10 @@ def _sensor_pose(header: PlyHeader) -> Pose | None:
             f"{header.path}: 'obj_info {POSE_KEY}' is not a rigid motion of 16 numbers ({error}); "
             "correct or remove the line"
         ) from error
+
+
+FORMAT = ScanFormat(
+    suffixes=(".ply",),
+    read=read_ply,
+    keeps=(Keeps.GRID, Keeps.SENSOR, Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
+)

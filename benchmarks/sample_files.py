@@ -1,0 +1,253 @@
+"""Small files of every format of scans, made here: what readers are tested and mutated with.
+
+All show the same surface, of 6 rows and 7 columns, of which two cells saw nothing.
+"""
+
+import gzip
+import json
+import struct
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scanweld.geometry.arrays import ByteArray, FloatArray
+
+ROWS, COLUMNS = 6, 7
+HOLES = ((0, 0), (3, 4))
+GROUND = np.array([[0, -1, 0, 10], [1, 0, 0, 20], [0, 0, 1, -3], [0, 0, 0, 1]], dtype=np.float64)
+"""world_from_scan (4, 4) of the second scan of files that hold two; the first's is the identity."""
+
+
+def surface() -> FloatArray:
+    """Points (6, 7, 3), exact in single precision; NaN where nothing was seen."""
+    v, u = np.mgrid[:ROWS, :COLUMNS].astype(np.float64)
+    points = np.stack([u / 4, v / 4, 8 + (u - 3) ** 2 / 32 + v * u / 64], axis=-1)
+    for hole in HOLES:
+        points[hole] = np.nan
+    return points
+
+
+def colors() -> ByteArray:
+    """Their colours (42, 3), row after row."""
+    return (np.arange(3 * ROWS * COLUMNS).reshape(-1, 3) * 2 % 256).astype(np.uint8)
+
+
+def pcd_head(fields: str, sizes: str, types: str, data: str, counts: str = "") -> bytes:
+    """The header of a PCD file of the surface."""
+    counts = counts or " ".join("1" for _ in fields.split())
+    return (
+        f"# .PCD v0.7\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n"
+        f"WIDTH {COLUMNS}\nHEIGHT {ROWS}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {ROWS * COLUMNS}\n"
+        f"DATA {data}\n"
+    ).encode()
+
+
+def pcd_ascii() -> bytes:
+    """With padding of four numbers a point, as old versions of PCL write it."""
+    lines = [f"{x:g} {y:g} {z:.9g} 0 0 128 63" for x, y, z in surface().reshape(-1, 3)]
+    head = pcd_head("x y z _", "4 4 4 1", "F F F U", "ascii", "1 1 1 4")
+    return head + "\n".join(lines).encode() + b"\n"
+
+
+def packed_colors() -> FloatArray:
+    """The colours as bits 0x00RRGGBB of single precision numbers (42,)."""
+    red, green, blue = colors().astype(np.uint32).T
+    return (red << 16 | green << 8 | blue).view(np.float32)
+
+
+def pcd_binary() -> bytes:
+    """With padding between the fields and packed colours."""
+    table = np.zeros(ROWS * COLUMNS, "<f4, <f4, <f4, <u4, <f4, <u2")
+    for k, column in enumerate(surface().reshape(-1, 3).T):
+        table[f"f{k}"] = column
+    table["f4"] = packed_colors()
+    head = pcd_head("x y z _ rgb label", "4 4 4 1 4 2", "F F F U F U", "binary", "1 1 1 4 1 1")
+    return head + table.tobytes()
+
+
+def pcd_compressed() -> bytes:
+    """Field after field, in LZF."""
+    fields = [*surface().reshape(-1, 3).T.astype("<f4"), packed_colors()]
+    whole = b"".join(field.tobytes() for field in fields)
+    packed = lzf_compress(whole)
+    head = pcd_head("x y z rgb", "4 4 4 4", "F F F F", "binary_compressed")
+    return head + struct.pack("<II", len(packed), len(whole)) + packed
+
+
+def lzf_compress(data: bytes) -> bytes:
+    """LZF that copies what lies four bytes before, as in columns of like numbers, and no more."""
+    out, at, literal = bytearray(), 0, bytearray()
+
+    def flush() -> None:
+        for begin in range(0, len(literal), 32):
+            run = literal[begin : begin + 32]
+            out.extend([len(run) - 1, *run])
+        literal.clear()
+
+    while at < len(data):
+        length = 0
+        while at >= 4 and at + length < len(data) and data[at + length] == data[at + length - 4]:
+            length += 1
+        length = min(length, 264)
+        if length < 3:
+            literal.append(data[at])
+            at += 1
+            continue
+        flush()
+        out.extend([(length - 2) << 5, 3] if length < 9 else [7 << 5, length - 9, 3])
+        at += length
+    flush()
+    return bytes(out)
+
+
+def ptx() -> bytes:
+    """Two scans, the second with colours."""
+    cells = np.nan_to_num(surface()).transpose(1, 0, 2).reshape(-1, 3)
+    shades = colors().reshape(ROWS, COLUMNS, 3).transpose(1, 0, 2).reshape(-1, 3)
+    text = ""
+    for matrix in (np.eye(4), GROUND):
+        text += f"{COLUMNS}\n{ROWS}\n"
+        for row in (matrix[:3, 3], *matrix[:3, :3].T, *matrix.T):
+            text += " ".join(f"{number:g}" for number in row) + "\n"
+        for point, shade in zip(cells, shades, strict=True):
+            color = " {} {} {}".format(*shade) if matrix is GROUND else ""
+            text += "{:g} {:g} {:.9g} 0.5".format(*point) + color + "\n"
+    return text.encode()
+
+
+def ply_organised() -> bytes:
+    """With capitals and NaN, as PCL writes grids."""
+    head = f"ply\nformat binary_little_endian 1.0\nobj_info num_cols {COLUMNS}\n"
+    head += f"obj_info num_rows {ROWS}\nelement vertex {ROWS * COLUMNS}\n"
+    head += "".join(f"property float {axis}\n" for axis in "XYZ") + "end_header\n"
+    return head.encode() + surface().astype("<f4").tobytes()
+
+
+def npy(array: NDArray) -> bytes:
+    """An array as NumPy saves it."""
+    stream = BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def npz() -> bytes:
+    """Points as a grid, with colours."""
+    stream = BytesIO()
+    np.savez_compressed(stream, points=surface(), colors=colors().reshape(ROWS, COLUMNS, 3))
+    return stream.getvalue()
+
+
+def vtk(*, is_binary: bool) -> bytes:
+    """A structured grid with cell data before the colours of the points."""
+    points = np.nan_to_num(surface()).reshape(-1, 3)
+    kind = "BINARY" if is_binary else "ASCII"
+    body = f"# vtk DataFile Version 4.2\na scan\n{kind}\nDATASET STRUCTURED_GRID\n".encode()
+    body += f"DIMENSIONS {COLUMNS} {ROWS} 1\nPOINTS {len(points)} float\n".encode()
+    body += _vtk_values(points, ">f4", is_binary)
+    body += b"METADATA\nINFORMATION 0\n\nCELL_DATA 2\nSCALARS id int 1\nLOOKUP_TABLE default\n"
+    body += _vtk_values(np.array([7, 9]), ">i4", is_binary)
+    body += f"POINT_DATA {len(points)}\nCOLOR_SCALARS rgb 3\n".encode()
+    return body + _vtk_values(colors() / (1 if is_binary else 255), ">u1", is_binary)
+
+
+def _vtk_values(values: NDArray, kind: str, is_binary: bool) -> bytes:
+    if is_binary:
+        return values.astype(kind).tobytes() + b"\n"
+    return " ".join(f"{value:.9g}" for value in values.ravel()).encode() + b"\n"
+
+
+def glb() -> bytes:
+    """Two triangles and two points under nodes that turn, scale and shift."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype="<f4")
+    corners = np.array([0, 1, 2, 0, 2, 3], dtype="<u2")
+    body = points.tobytes() + corners.tobytes()
+    content = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [1]}],
+        "nodes": [
+            {"mesh": 0, "scale": [2, 2, 2], "rotation": [0, 0, 0.5**0.5, 0.5**0.5]},
+            {"children": [0, 2], "translation": [4e6, 5e5, 0.25]},
+            {"mesh": 1, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 7, 1]},
+        ],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]},
+            {"primitives": [{"attributes": {"POSITION": 2}, "mode": 0}]},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"},
+            {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 12},
+            {"buffer": 0, "byteOffset": 12, "byteLength": 36, "byteStride": 24},
+        ],
+        "buffers": [{"byteLength": len(body)}],
+    }
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(body), b"BIN\0") + body
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def e57() -> bytes:
+    """Two scans as pye57 writes them, the second with a pose."""
+    import pye57
+
+    rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
+    points, seen = surface().reshape(-1, 3), np.isfinite(surface()).all(axis=2).ravel()
+    table = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points[seen].T, strict=True))
+    table |= {"rowIndex": rows[seen], "columnIndex": columns[seen]}
+    table |= zip(("colorRed", "colorGreen", "colorBlue"), colors()[seen].T, strict=True)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.e57"
+        file = pye57.E57(str(path), mode="w")
+        half = np.array([0.5**0.5, 0, 0, 0.5**0.5])
+        file.write_scan_raw(table, name="left")
+        file.write_scan_raw(table, name="right", rotation=half, translation=GROUND[:3, 3])
+        file.close()
+        return path.read_bytes()
+
+
+def las(*, is_packed: bool) -> bytes:
+    """Points as laspy writes them, at map coordinates in hundredths."""
+    import laspy
+
+    header = laspy.LasHeader(point_format=2, version="1.2")
+    header.offsets, header.scales = np.array([4e6, 5e5, 0]), np.full(3, 0.01)
+    found = laspy.LasData(header)
+    found.xyz = np.nan_to_num(np.round(surface(), 2)).reshape(-1, 3) + header.offsets
+    for name, channel in zip(("red", "green", "blue"), colors().T, strict=True):
+        setattr(found, name, channel.astype(np.uint16) * 257)
+    stream = BytesIO()
+    found.write(stream, do_compress=is_packed)
+    return stream.getvalue()
+
+
+SAMPLES: dict[str, Callable[[], bytes]] = {
+    "ascii.pcd": pcd_ascii,
+    "binary.pcd": pcd_binary,
+    "compressed.pcd": pcd_compressed,
+    "two.ptx": ptx,
+    "organised.ply": ply_organised,
+    "packed.pcd.gz": lambda: gzip.compress(pcd_binary(), mtime=0),
+    "grid.npy": lambda: npy(surface()),
+    "grid.npz": npz,
+    "ascii.vtk": lambda: vtk(is_binary=False),
+    "binary.vtk": lambda: vtk(is_binary=True),
+    "nodes.glb": glb,
+}
+"""Makers of the files by their names,"""
+WITH_LIBRARIES: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "two.e57": ("pye57", e57),
+    "points.las": ("laspy", lambda: las(is_packed=False)),
+    "points.laz": ("lazrs", lambda: las(is_packed=True)),
+}
+"""and of those that a library writes: its name, and the maker."""

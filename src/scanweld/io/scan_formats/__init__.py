@@ -1,0 +1,1 @@
+"""Formats of scans and meshes: a module each, which the registry finds."""

@@ -1,0 +1,377 @@
+"""Files of scans that other programs write: grid, pose and colours kept, all else told."""
+
+import gzip
+import re
+import sys
+import zipfile
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import trimesh.visual
+
+from benchmarks import fuzz
+from benchmarks.sample_files import (
+    COLUMNS,
+    GROUND,
+    HOLES,
+    ROWS,
+    SAMPLES,
+    WITH_LIBRARIES,
+    colors,
+    glb,
+    npy,
+    pcd_binary,
+    pcd_compressed,
+    pcd_head,
+    surface,
+    vtk,
+)
+from scanweld.errors import ReadError
+from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io import collect, read_scan
+from scanweld.io.raw import POSE_NOTE
+from scanweld.io.scans import read_scans
+from scanweld.io.unpack import SMALL
+
+SEEN = np.isfinite(surface()).all(axis=2)
+UNSEEN_NOTE = f"{len(HOLES)} points that are not finite dropped: nothing was seen there"
+
+
+def write(folder: Path, name: str, data: bytes | None = None) -> Path:
+    """A sample, or other bytes, as a file."""
+    path = folder / name
+    path.write_bytes(SAMPLES[name]() if data is None else data)
+    return path
+
+
+def assert_is_surface(scan: RangeScan) -> None:
+    """A scan shows the samples' surface, with its grid."""
+    assert scan.grid is not None and scan.grid.shape == (ROWS, COLUMNS)
+    np.testing.assert_array_equal(scan.grid >= 0, SEEN)
+    assert scan.num_dropped == len(HOLES)
+    np.testing.assert_allclose(scan.points[scan.grid[SEEN]], surface()[SEEN], rtol=1e-7)
+
+
+def assert_has_colors(scan: RangeScan) -> None:
+    assert scan.grid is not None and scan.colors is not None
+    np.testing.assert_array_equal(
+        scan.colors[scan.grid[SEEN]], colors().reshape(ROWS, COLUMNS, 3)[SEEN]
+    )
+
+
+@pytest.mark.parametrize("name", ["ascii.pcd", "binary.pcd", "compressed.pcd"])
+def test_pcd_of_every_kind_keeps_grid_and_colors(name: str, tmp_path: Path):
+    scan = read_scan(write(tmp_path, name))
+    assert_is_surface(scan)
+    assert scan.viewpoint is Viewpoint.UNKNOWN
+    if name == "ascii.pcd":
+        assert scan.colors is None
+    else:
+        assert_has_colors(scan)
+    told = ("fields left out: label",) if name == "binary.pcd" else ()
+    assert scan.notes == (*told, UNSEEN_NOTE)
+
+
+def pcd_of(told: str, *lines: str, viewpoint: str = "0 0 0 1 0 0 0") -> bytes:
+    """An ASCII PCD without a grid; ``told`` are its fields, all single precision."""
+    count = len(told.split())
+    kinds = f"SIZE {'4 ' * count}\nTYPE {'F ' * count}\nWIDTH {len(lines)}\nHEIGHT 1"
+    head = f"FIELDS {told}\r\n{kinds}\nVIEWPOINT {viewpoint}\nDATA ascii\n"
+    return (head + "\n".join(lines)).encode()
+
+
+def test_pcd_normals_intensity_and_colors_written_as_numbers(tmp_path: Path):
+    lines = ["0 0 1 0 0 -1 4.2108e+06", "1 0 1 0 0 -1 0", "0 1 nan 0 0 -1 255"]
+    scan = read_scan(
+        write(tmp_path, "a.pcd", pcd_of("x y z normal_x normal_y normal_z rgb", *lines))
+    )
+    assert scan.normals is not None and scan.colors is not None
+    np.testing.assert_array_equal(scan.normals, [[0, 0, -1]] * 2)
+    np.testing.assert_array_equal(scan.colors, [[64, 64, 112], [0, 0, 0]])
+    tiny = np.uint32(0x0A141E).view(np.float32)
+    scan = read_scan(write(tmp_path, "b.pcd", pcd_of("X Y Z RGB", f"0 0 1 {tiny:.9g}", "1 0 1 0")))
+    assert scan.colors is not None
+    np.testing.assert_array_equal(scan.colors, [[10, 20, 30], [0, 0, 0]])
+    scan = read_scan(write(tmp_path, "c.pcd", pcd_of("x y z intensity", "0 0 1 0.2", "1 0 1 1")))
+    assert scan.notes == ("intensity read as grey",)
+
+
+def test_pcd_viewpoint_is_believed_if_it_sees_the_points(tmp_path: Path):
+    lines = [f"{x} {y} {5 + x * y / 9}" for x in range(4) for y in range(4)]
+
+    def read(viewpoint: str) -> RangeScan:
+        return read_scan(write(tmp_path, "a.pcd", pcd_of("x y z", *lines, viewpoint=viewpoint)))
+
+    scan = read("1.5 1.5 -2 1 0 0 0")
+    assert scan.viewpoint is Viewpoint.GIVEN and "VIEWPOINT" in scan.notes[0]
+    np.testing.assert_allclose(scan.sensor_pose.translation, [1.5, 1.5, -2])
+    assert scan.sensor_pose.rotation[2, 2] > 0.99
+    # The whole scan turned over is no reason to look away from it: Kinect tutorials write that.
+    assert read("0 0 0 0 1 0 0").sensor_pose.rotation[2, 2] > 0.8
+    scan = read("1.5 1.5 5.2 1 0 0 0")
+    assert scan.viewpoint is Viewpoint.UNKNOWN and "left out" in scan.notes[0]
+    assert read("0 0 0 1 0 0 0").viewpoint is Viewpoint.UNKNOWN
+
+
+def test_ptx_gives_several_scans_with_poses(tmp_path: Path):
+    path = write(tmp_path, "two.ptx")
+    assert [(file.name, file.part) for file in collect([tmp_path])] == [("two_1", 0), ("two_2", 1)]
+    first, second = read_scans(path)
+    assert (first.name, second.name) == ("two_1", "two_2")
+    for scan in (first, second):
+        assert_is_surface(scan)
+    assert first.notes == (UNSEEN_NOTE, "intensity read as grey")
+    assert second.notes == (UNSEEN_NOTE, POSE_NOTE)
+    assert_has_colors(second)
+    assert first.world_from_scan is not None and second.world_from_scan is not None
+    np.testing.assert_array_equal(first.world_from_scan.matrix(), np.eye(4))
+    np.testing.assert_array_equal(second.world_from_scan.matrix(), GROUND)
+    assert first.content_hash() != second.content_hash()  # colours
+    with pytest.raises(ReadError, match="has no scan 3, but 2"):
+        read_scan(path, part=2)
+
+
+def test_a_local_origin_is_told_by_packed_files_too(tmp_path: Path):
+    text = b"# scanweld_shift 1000000 0 -2.5\n0 0 1\n1 0 1\n"
+    scan = read_scan(write(tmp_path, "a.xyz.gz", gzip.compress(text)))
+    np.testing.assert_array_equal(scan.points, [[1e6, 0, -1.5], [1e6 + 1, 0, -1.5]])
+    broken = text.replace(b"-2.5", b"nan")
+    with pytest.raises(ReadError, match="its scanweld_shift is not three numbers"):
+        read_scan(write(tmp_path, "a.xyz.gz", gzip.compress(broken)))
+
+
+def test_names_of_several_scans_do_not_clash(tmp_path: Path):
+    write(tmp_path, "two.ptx")
+    lines = SAMPLES["two.ptx"]().splitlines(keepends=True)
+    write(tmp_path, "two_1.ptx", b"".join(lines[: 10 + ROWS * COLUMNS]))
+    files = collect([tmp_path])
+    assert [file.name for file in files] == ["two.ptx/1", "two.ptx/2", "two_1"]
+    assert [file.part for file in files] == [0, 1, 0]
+
+
+@pytest.mark.parametrize("name", ["organised.ply", "packed.pcd.gz", "grid.npy", "grid.npz"])
+def test_grids_of_other_formats(name: str, tmp_path: Path):
+    path = write(tmp_path, name)
+    scan = read_scan(path)
+    assert_is_surface(scan)
+    assert scan.name == name.partition(".")[0] == collect([path])[0].name
+    if name.endswith((".gz", ".npz")):
+        assert_has_colors(scan)
+
+
+@pytest.mark.parametrize("name", ["ascii.vtk", "binary.vtk"])
+def test_vtk_structured_grid(name: str, tmp_path: Path):
+    scan = read_scan(write(tmp_path, name))
+    assert scan.grid is not None and scan.colors is not None and scan.notes == ()
+    np.testing.assert_allclose(scan.points[scan.grid], np.nan_to_num(surface()), rtol=1e-7)
+    np.testing.assert_array_equal(scan.colors, colors())
+
+
+def test_vtk_polygons_of_old_and_new_versions(tmp_path: Path):
+    head = "# vtk DataFile Version 3.0\n\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n"
+    head += "0 0 0 1 0 0 1 1 0 0 1 0\nVERTICES 1 2\n1 0\n"
+    tail = "POINT_DATA 4\nNORMALS n float\n" + "0 0 1 " * 4 + "\nTENSORS t float\n1 2\n"
+    for version, cells in (
+        ("3.0", "POLYGONS 2 9\n4 0 1 2 3\n3 0 1 2\n"),
+        (
+            "5.1",
+            "POLYGONS 3 7\nOFFSETS vtktypeint64\n0 4 7\nCONNECTIVITY vtktypeint64\n0 1 2 3 0 1 2\n",
+        ),
+    ):
+        if version == "5.1":
+            head = head.replace("VERTICES 1 2\n1 0\n", "")
+        scan = read_scan(write(tmp_path, "a.vtk", (head + cells + tail).encode()))
+        assert scan.faces is not None and scan.normals is not None
+        np.testing.assert_array_equal(scan.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2]])
+        np.testing.assert_array_equal(scan.normals, [[0, 0, 1]] * 4)
+        assert scan.notes == ("left out from TENSORS on",)
+
+
+def test_glb_nodes_move_their_meshes_exactly(tmp_path: Path):
+    scan = read_scan(write(tmp_path, "nodes.glb"))
+    origin = np.array([4e6, 5e5, 0.25])
+    square = 2 * np.array([[0, 0, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0]])
+    np.testing.assert_allclose(scan.points[:4] - origin, square, atol=1e-9)
+    np.testing.assert_array_equal(scan.points[4:] - origin, [[1, 0, 7], [0, 1, 7]])
+    np.testing.assert_array_equal(scan.faces, [[0, 1, 2], [0, 2, 3]])
+
+
+def test_ply_element_camera_gives_the_place_of_the_sensor(tmp_path: Path):
+    names = ["view_px", "view_py", "view_pz"]
+    names += [f"{axis}_axis{part}" for axis in "xyz" for part in "xyz"]
+    head = "ply\nformat ascii 1.0\nelement vertex 4\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz") + "element camera 1\n"
+    head += "".join(f"property float {name}\n" for name in names) + "end_header\n"
+    points = "0 0 5\n1 0 5\n0 1 5\n1 1 6\n"
+    for numbers, is_given in (("0.5 0.5 0", True), ("0 0 0", False), ("0.5 0.5 5.2", False)):
+        data = head + points + numbers + " 1 0 0 0 1 0 0 0 1\n"
+        scan = read_scan(write(tmp_path, "a.ply", data.encode()))
+        assert (scan.viewpoint is Viewpoint.GIVEN) is is_given
+    assert "lies among the points" in scan.notes[0]
+
+
+def test_obj_with_colors_on_some_vertices_is_read_without(tmp_path: Path):
+    scan = read_scan(write(tmp_path, "a.obj", b"v 0 0 1 1 0 0\nv 1 2 3\nv 4 5 6 0 0 1\n"))
+    np.testing.assert_array_equal(scan.points, [[0, 0, 1], [1, 2, 3], [4, 5, 6]])
+    assert scan.colors is None and "colours on some" in scan.notes[0]
+
+
+def test_e57_gives_several_scans_by_their_names(tmp_path: Path):
+    library, make = WITH_LIBRARIES["two.e57"]
+    pytest.importorskip(library)
+    path = write(tmp_path, "two.e57", make())
+    left, right = read_scans(path)
+    assert (left.name, right.name) == ("left", "right")
+    for scan in (left, right):
+        assert scan.grid is not None
+        np.testing.assert_array_equal(scan.grid >= 0, SEEN)
+        np.testing.assert_array_equal(scan.points[scan.grid[SEEN]], surface()[SEEN])
+        assert_has_colors(scan)
+    assert right.world_from_scan is not None and right.notes == (POSE_NOTE,)
+    np.testing.assert_allclose(right.world_from_scan.matrix(), GROUND, atol=1e-12)
+    with pytest.raises(ReadError, match="is not read packed"):
+        read_scan(write(tmp_path, "a.e57.gz", gzip.compress(make())))
+    for data in (make()[:-600], b"hello", make()[:3000] + bytes(9) + make()[3009:]):
+        with pytest.raises(ReadError, match="not an E57 file, or a broken one"):
+            for file in collect([write(tmp_path, "b.e57", data)]):
+                file.read()
+
+
+@pytest.mark.parametrize("name", ["points.las", "points.laz"])
+def test_las_keeps_map_coordinates_and_colors(name: str, tmp_path: Path):
+    library, make = WITH_LIBRARIES[name]
+    pytest.importorskip(library)
+    scan = read_scan(write(tmp_path, name, make()))
+    told = np.nan_to_num(np.round(surface(), 2)).reshape(-1, 3) + np.array([4e6, 5e5, 0])
+    np.testing.assert_allclose(scan.points, told, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(scan.colors, colors())
+    for data in (make()[:-30], b"hello", make()[:200]):
+        with pytest.raises(ReadError):
+            read_scan(write(tmp_path, name, data))
+
+
+def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for library, name, extra in (("pye57", "a.e57", "e57"), ("laspy", "a.laz", "las")):
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(ReadError, match=rf"pip install 'scanweld\[{extra}"):
+            read_scan(write(tmp_path, name, b"anything"))
+
+
+def test_bombs_are_refused(tmp_path: Path):
+    bomb = gzip.compress(bytes(SMALL + 1))
+    with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
+        read_scan(write(tmp_path, "a.ply.gz", bomb))
+    stream = BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("points.npy", bytes(SMALL + 1))
+    with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
+        read_scan(write(tmp_path, "a.npz", stream.getvalue()))
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.pcd", b"hello\n", "no line DATA"),
+        ("a.pcd", pcd_head("x y", "4 4", "F F", "ascii") + b"0 0\n" * 42, "lack x, y or z"),
+        ("a.pcd", pcd_head("x y z", "4 4", "F F F", "ascii"), "as many SIZE"),
+        ("a.pcd", pcd_head("x y z", "4 4 3", "F F F", "ascii"), "SIZE 3"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "zip"), "unknown DATA 'zip'"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 0 0\n", "is shorter than 42"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 0 0\n" * 43, "longer"),
+        ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 a 0\n" * 42, "line 12: 'a'"),
+        ("a.pcd", pcd_binary()[:-1], "shorter"),
+        ("a.pcd", pcd_binary() + b"1", "longer"),
+        ("a.pcd", pcd_binary().replace(b"POINTS 42", b"POINTS 43"), "WIDTH x HEIGHT"),
+        ("a.pcd", pcd_compressed()[:-9], "shorter"),
+        # The first thing compressed is a copy of what is not there.
+        ("a.pcd", re.sub(rb"(?s)(?<=compressed\n.{8}).", b"\xe0", pcd_compressed()), "broken"),
+        ("a.pcd", pcd_binary().replace(b"WIDTH 7", b"WIDTH 0"), "WIDTH x HEIGHT"),
+        ("a.xyz.gz", gzip.compress(b"0 0 0\n")[:-3], "cannot be unpacked"),
+        ("a.gz", gzip.compress(b"0 0 0\n"), "unknown format"),
+        ("a.npy", npy(surface())[:-1], "truncated"),
+        ("a.npy", npy(np.zeros((4, 5))), r"shape \(4, 5\)"),
+        ("a.npy", npy(np.array([{}])), "save the points as numbers"),
+        ("a.npz", b"PK\3\4", "cannot be unpacked"),
+        ("a.vtk", b"hello", "not a VTK legacy file"),
+        ("a.vtk", vtk(is_binary=True)[:-9], "too early"),
+        ("a.vtk", vtk(is_binary=False)[:-90], "too early"),
+        ("a.vtk", vtk(is_binary=False).replace(b"STRUCTURED_GRID", b"FIELD"), "POLYDATA"),
+        ("a.glb", b"glTF", "not a GLB file"),
+        ("a.glb", glb()[:-9], "truncated"),
+        ("a.glb", glb().replace(b'"count": 4', b'"count": 9'), "smaller than it says"),
+        ("a.glb", glb().replace(b"[0, 2]", b"[0, 1]"), "no tree"),
+        ("a.glb", glb().replace(b'"mode": 0', b'"mode": 5'), "strips"),
+        ("a.ptx", b"3\n2\n0 0 0\n", "no scan of a PTX file begins here"),
+        ("a.ptx", SAMPLES["two.ptx"]()[:-900], "scan 2 has"),
+        ("a.ptx", SAMPLES["two.ptx"]() + b"7\n", "line 105: no scan"),
+    ],
+)
+def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_path: Path):
+    with pytest.raises(ReadError, match=says) as caught:
+        read_scan(write(tmp_path, name, data))
+    assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
+
+
+def test_what_open3d_writes_as_pcd_is_read(tmp_path: Path):
+    o3d = pytest.importorskip("open3d")
+    rng = np.random.default_rng(4)
+    points, normals = rng.random((50, 3)), np.tile([0.6, 0, 0.8], (50, 1))
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.colors = o3d.utility.Vector3dVector(rng.integers(0, 256, (50, 3)) / 255)
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    path = tmp_path / "a.pcd"
+    for options in ({}, {"write_ascii": True}, {"compressed": True}):
+        o3d.io.write_point_cloud(str(path), cloud, **options)
+        scan = read_scan(path)
+        assert scan.normals is not None and scan.notes == ()
+        np.testing.assert_allclose(scan.points, points, atol=1e-7)
+        np.testing.assert_allclose(scan.normals, normals, atol=1e-7)
+        np.testing.assert_array_equal(scan.colors, np.rint(255 * np.asarray(cloud.colors)))
+
+
+def test_what_trimesh_writes_as_glb_is_read(tmp_path: Path):
+    rng, path = np.random.default_rng(4), tmp_path / "a.glb"
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    shades = rng.integers(0, 256, (len(ball.vertices), 4)).astype(np.uint8)
+    ball.visual = trimesh.visual.ColorVisuals(ball, vertex_colors=shades)
+    cloud, turn = rng.random((9, 3)), trimesh.transformations.rotation_matrix(1, [1, 2, 3])
+    scene = trimesh.Scene()
+    scene.add_geometry(ball, transform=turn)
+    scene.add_geometry(trimesh.PointCloud(cloud), transform=turn.T)
+    scene.export(path)
+    scan = read_scan(path)
+    balls, clouds = (
+        trimesh.transform_points(p, t) for p, t in ((ball.vertices, turn), (cloud, turn.T))
+    )
+    np.testing.assert_allclose(np.sort(scan.points, 0), np.sort([*balls, *clouds], 0), atol=1e-6)
+    assert "colours on some of its meshes only" in scan.notes[0]
+    ball.export(path)
+    np.testing.assert_array_equal(read_scan(path).colors, shades[:, :3])
+
+
+@pytest.mark.parametrize("form", ["vtk42", "vtk51"])
+@pytest.mark.parametrize("is_binary", [True, False])
+def test_what_meshio_writes_as_vtk_is_read(form: str, is_binary: bool, tmp_path: Path):
+    meshio = pytest.importorskip("meshio")
+    rng, path = np.random.default_rng(4), tmp_path / "a.vtk"
+    points, faces = rng.random((50, 3)), rng.integers(0, 50, (30, 3))
+    data = {"a": rng.random(50), "v": rng.random((50, 3))}
+    mesh = meshio.Mesh(points, [("triangle", faces)], point_data=data)
+    meshio.write(path, mesh, file_format=form, binary=is_binary)
+    scan = read_scan(path)
+    np.testing.assert_array_equal(scan.points, points)
+    np.testing.assert_array_equal(scan.faces, faces)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", sorted(set(fuzz.samples()) - {"a.xyz"}))
+def test_mutated_files_are_read_or_refused(name: str, tmp_path: Path):
+    data = fuzz.samples()[name]()
+    for seed in range(50):
+        fuzz.read_all(
+            write(tmp_path, name, fuzz.broken_file(name, data, np.random.default_rng(seed)))
+        )
+    assert fuzz.read_all(write(tmp_path, name, data))
