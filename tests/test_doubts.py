@@ -17,8 +17,8 @@ from tests.results import a_result
 from tests.view_graphs import DrawnJudge, graph_with, seen, world_of
 
 CODES = [
-    *("alone", "violated", "unpaired", "mark_only", "not_refined"),
-    *("disagreement", "off_axis", "scale", "confidence"),
+    *("camera_stood", "alone", "moved_part", "violated", "unpaired", "mark_only"),
+    *("not_refined", "disagreement", "off_axis", "scale", "inexact", "confidence"),
 ]
 
 
