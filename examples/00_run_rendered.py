@@ -7,8 +7,8 @@ import scanweld
 
 
 def run_rendered(folder: Path) -> None:
-    """Scan a creature from five sides, then register and fuse the scans."""
-    scanweld.simulate(scanweld.creature(voxels=70), folder / "scans", num_scans=5, pixels=140)
+    """Scan a creature from six sides, then register and fuse the scans."""
+    scanweld.simulate(scanweld.creature(voxels=70), folder / "scans", num_scans=6, pixels=160)
 
     scans = scanweld.read_scans(folder / "scans")
     result = scanweld.run(scans)

@@ -118,7 +118,7 @@ def test_a_scan_more_or_fewer_redoes_what_it_touches_and_changes_no_byte(
     folder = write_scans(tmp_path / "scans", scans)
     files = sorted(folder.iterdir())
     pairs = PairsConfig(num_anchors=8, num_turns=8, num_survivors=(40, 10))
-    config = Config(pairs=pairs, fusion=FusionConfig(max_voxels_across=60))
+    config = Config(pairs=pairs, fusion=FusionConfig(max_voxels_across=60, with_doubtful=True))
     put, kept = FileCache.put, list[object]()
 
     def counted(self: FileCache, key: str, value: object) -> None:

@@ -156,9 +156,7 @@ def test_pairs_conduct_like_wires(monkeypatch: pytest.MonkeyPatch):
     pair = creature_pair(40)
     judge = replace(pair.judge(), fields=pair.fields + pair.fields)
     contours = contour_matcher(pair.scans, CONFIG.contours)
-    diagnostics = PairDiagnostics(
-        judge=judge, sources=[], contours=contours, sensor=pair.sensor()
-    )
+    diagnostics = PairDiagnostics(judge=judge, sources=[], contours=contours, sensor=pair.sensor())
     joint = joint_evidence(graph, component, diagnostics)
     assert joint.conductance[0, 1] == pytest.approx(0.7, abs=1e-3)
     assert joint.conductance_without((0, 1), 0.4) == pytest.approx(0.3, abs=1e-3)

@@ -19,7 +19,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 SLOW = pytest.mark.slow
 SAYS = {
-    "00_run_rendered.py": (r"\Agood: 5 of 5 scans are placed", r"ply: ([5-9]\d{3}|\d{5,}) faces"),
+    "00_run_rendered.py": (r"\Agood: 6 of 6 scans are placed", r"ply: ([5-9]\d{3}|\d{5,}) faces"),
     "01_one_pair.py": (r"\Agood: ", r"the best pose is 0\.[0-4]\d* deg off"),
     "02_own_format.py": ("viewpoint  given", "viewpoint  estimated"),
     "03_view_graph.py": (

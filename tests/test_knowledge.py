@@ -36,7 +36,9 @@ HASTY = CONFIG.model_copy(
     }
 )
 """A search so small that it misses pairs of thin overlap."""
-THOROUGH = CONFIG.model_copy(update={"prepare": PrepareConfig(num_samples=1500)})
+STRICT = CONFIG.model_copy(update={"pairs": CONFIG.pairs.model_copy(update={"min_score": 0.10})})
+"""Pairs of little overlap are refused unless a fact speaks for them."""
+THOROUGH = STRICT.model_copy(update={"prepare": PrepareConfig(num_samples=1500)})
 """Samples enough to tell a pair of thin overlap from one that slides."""
 FIRST, SECOND = "scan_01", "scan_02"
 THIN = (20, 122)
@@ -111,7 +113,8 @@ def test_a_start_rescues_a_pair_that_the_search_misses_unless_it_is_wrong():
     rough = {SECOND: Pose.exp([0, 0, np.radians(8.0), 2.0, -2.0, 1.0])}
     for start in (poses_of(scene), poses_of(scene, rough)):
         result = run(scene.scans, Knowledge(start=start), HASTY)
-        assert result.verdict is Verdict.GOOD
+        # How sure so little overlap is, the confidence says.
+        assert len(result.poses) == 2 and result.verdict is not Verdict.NOTHING
         assert_right(result, scene)
         assert verdicts(result) == {"start poses": FactVerdict.HELD}
     wrong = poses_of(scene, {SECOND: ASIDE[0]})
@@ -179,10 +182,10 @@ def test_a_fixed_scan_stays_and_two_that_cannot_both_stay_are_named():
 
 def test_together_lets_a_pair_through_that_is_just_refused():
     scene = seen_from(*TOO_THIN)
-    alone = run(scene.scans)
+    alone = run(scene.scans, config=STRICT)
     assert alone.verdict is Verdict.NOTHING
     assert "below" in alone.pairs[0].reason
-    result = run(scene.scans, Knowledge(together=((SECOND, FIRST),)))
+    result = run(scene.scans, Knowledge(together=((SECOND, FIRST),)), STRICT)
     # That they are together lets them be placed; how sure that is, their confidence says.
     assert len(result.poses) == 2 and result.verdict is not Verdict.NOTHING
     assert_right(result, scene)
