@@ -20,7 +20,7 @@ from scanweld.reconstruction import Reconstruction
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
 """The defaults; nobody looks at the model."""
-NUM_SETS, NUM_QUICK = 280, 2
+NUM_SETS, NUM_QUICK = 280, 4
 
 
 @dataclass(kw_only=True)

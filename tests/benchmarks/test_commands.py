@@ -99,8 +99,8 @@ def test_calibration_runs_quickly(
     command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     package = kept.CALIBRATION.read_bytes()
-    command(calibration, "--quick", "--sets", 1, "--workers", 1, "--out", tmp_path / "docs")
-    assert "1 sets of other objects" in capsys.readouterr().out
+    command(calibration, "--quick", "--sets", 4, "--workers", 1, "--out", tmp_path / "docs")
+    assert "4 sets of other objects" in capsys.readouterr().out
     learned = read_calibration((tmp_path / "docs/calibration.json").read_text(encoding="utf-8"))
     assert learned.made["code"] == code_digest(kept.CALIBRATED)
     assert not warn_of_old_calibration(learned)

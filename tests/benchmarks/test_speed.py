@@ -45,7 +45,7 @@ def a_pair(score: float, margin: float, *, right: bool, same: bool = True, sure:
 
 def test_limits_count_what_is_clear_and_wrong():
     pairs = [
-        *(a_pair(0.5, 0.9, right=True), a_pair(0.12, 0.9, right=False, sure=False)),
+        *(a_pair(0.5, 0.9, right=True), a_pair(0.06, 0.9, right=False, sure=False)),
         *(a_pair(0.5, 0.45, right=False, same=False), a_pair(0.5, 0.65, right=False)),
         {**a_pair(0.9, 1.0, right=False), "good": False},
     ]
