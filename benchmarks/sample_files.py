@@ -7,6 +7,7 @@ import gzip
 import json
 import struct
 from collections.abc import Callable
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -199,7 +200,7 @@ def glb() -> bytes:
 
 def e57() -> bytes:
     """Two scans as pye57 writes them, the second with a pose."""
-    import pye57
+    pye57 = import_module("pye57")
 
     rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
     points, seen = surface().reshape(-1, 3), np.isfinite(surface()).all(axis=2).ravel()
@@ -218,7 +219,7 @@ def e57() -> bytes:
 
 def las(*, is_packed: bool) -> bytes:
     """Points as laspy writes them, at map coordinates in hundredths."""
-    import laspy
+    laspy = import_module("laspy")
 
     header = laspy.LasHeader(point_format=2, version="1.2")
     header.offsets, header.scales = np.array([4e6, 5e5, 0]), np.full(3, 0.01)
