@@ -1,6 +1,7 @@
 """The joint refinement, and scans whose unit is a little off: exact truth, invariances."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
 
@@ -242,6 +243,28 @@ def test_scans_in_one_unit_are_not_blamed():
     assert estimate_scales(scans, apart, list(combinations(apart, 2))) == {}, (
         "scans that touch nothing have no scale"
     )
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_depth_that_is_bent_makes_scales_less_sure_and_accuses_nobody():
+    """Each scan seems to have another scale, so that none of them stands out."""
+    scene = creature_scene(6, noise=NOISE, seed=3)
+    rng = np.random.default_rng(5)
+    scans, poses = [], {}
+    for k, scan in enumerate(scene.scans):
+        seen = scan.sensor_pose.inverse().apply(scan.points)
+        size = np.ptp(seen[:, :2])
+        waves = np.sin(seen[:, :2] @ rng.normal(size=2) * 9.0 / size + rng.uniform(0, 6))
+        rays = seen / np.linalg.norm(seen, axis=1, keepdims=True)
+        bent = scan.sensor_pose.apply(seen + 0.006 * size * waves[:, None] * rays)
+        scans.append(prepare(replace(scan, points=bent), PrepareConfig()))
+        poses[k] = scene.world_from_scan[scan.name] @ scan.sensor_pose
+    pairs = list(combinations(poses, 2))
+    poses = refine_poses(scans, poses, pairs, RefineConfig()).poses
+    found = estimate_scales(scans, poses, pairs)
+    surest = max(estimate.deviation for estimate in estimates(1.0).values())
+    assert min(estimate.deviation for estimate in found.values()) > 2 * surest
+    assert not any(estimate.is_off for estimate in found.values())
 
 
 def test_the_unit_of_all_does_not_matter():
