@@ -10,8 +10,7 @@ from benchmarks.calibration.solids import SOLIDS
 from benchmarks.virtual import disturbances as harm
 from benchmarks.virtual import sensors, trims
 from benchmarks.virtual.bodies import Body, Rng
-from benchmarks.virtual.disturbances import Disturbance, alike, each, in_turn
-from benchmarks.virtual.rooms import in_standing_room, turned_before_sensor
+from benchmarks.virtual.disturbances import Disturbance, each, in_turn
 from benchmarks.virtual.scene import BASIN, HIDDEN_PIXELS, Scene, posed, with_mark_seen
 from benchmarks.virtual.scenery import held_by_hand, on_table, on_turntable
 from benchmarks.virtual.shots import Shot, take_shots
@@ -23,7 +22,10 @@ from scanweld.geometry.scan import principal_diameter
 STEREO, HARM, SCENERY, STRANGERS = 0.2, 0.4, 0.15, 0.2
 """Share of the sets of a sensor whose errors are correlated, in which something goes wrong besides,
 in which something else is scanned too, and that hold scans of another object of the same family."""
-MAX_SCANS = 6
+ALL_AROUND, ANYWHERE = 0.4, 0.2
+"""Share of the sets whose views go all around the object, as most people scan, and of those that
+come from anywhere; the others are parts of a ring."""
+MAX_SCANS = 9
 MAX_NOISE = 0.01
 OTHER = 500_000
 """So many seeds on there is another object."""
@@ -66,14 +68,18 @@ def _make_solid(family: str, seed: int) -> Body:
 
 
 def _views(body: Body, rng: Rng) -> list[View]:
-    """A part of a ring, from narrow to wide steps, or directions from all over the sphere."""
-    count = int(rng.integers(3, 6))
-    if rng.random() < 0.3:
+    """All around, a part of a ring from narrow to wide steps, or from all over the sphere."""
+    kind, count = rng.random(), int(rng.integers(3, 6))
+    elevations = rng.uniform(-30, 40, size=count)
+    if kind < ALL_AROUND:
+        count = int(rng.integers(5, 9))
+        azimuths = 360.0 / count * np.arange(count) + rng.uniform(-8, 8, size=count)
+        elevations = rng.uniform(-10, 35) + rng.uniform(-12, 12, size=count)
+    elif kind < ALL_AROUND + ANYWHERE:
         azimuths = rng.uniform(0, 360, size=count)
         elevations = np.degrees(np.arcsin(rng.uniform(-1, 1, size=count)))
     else:
         azimuths = rng.uniform(25, 100) * np.arange(count) + rng.uniform(-8, 8, size=count)
-        elevations = rng.uniform(-30, 40, size=count)
     pixels = np.full(count, 2 ** rng.uniform(6.0, 8.3))
     pixels[1::2] /= rng.choice([1.0, 1.0, 2.0, 3.0])
     azimuths += rng.uniform(0, 360)
@@ -84,22 +90,10 @@ def _views(body: Body, rng: Rng) -> list[View]:
 
 
 def _strangers(family: str, noise: NoiseModel, seed: int, rng: Rng) -> Sequence[Shot]:
-    """Two or three scans of another object of the family, in a world of their own."""
+    """Three scans or so of another object of the family, in a world of their own."""
     other, away = _make_solid(family, seed + OTHER), harm.far_away(rng)
     shots = take_shots(other, _views(other, rng)[:3], noise, seed + OTHER)
     return [replace(shot, world=1, world_from_sensor=away @ shot.pose) for shot in shots]
-
-
-def _in_room(body: Body, noise: NoiseModel, seed: int, rng: Rng) -> list[Shot]:
-    """Whole frames of a standing camera, whose waves stand still like all that it sees."""
-    count, pixels = int(rng.integers(3, 6)), (50.0, 130.0)
-    views = turned_before_sensor(body, rng, count=count, pixels=pixels, elevation_deg=(10.0, 60.0))
-    waves = each(
-        sensors.depth_waves,
-        of_depth=0.01 * 10 ** rng.uniform(-1.0, 0.3),
-        length_diameters=rng.uniform(0.04, 0.2),
-    )
-    return alike(waves)(in_standing_room(body, views, noise, seed), rng)
 
 
 def _stereo(rng: Rng) -> Disturbance:

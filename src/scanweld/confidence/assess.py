@@ -20,7 +20,6 @@ from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.sensor.accuracy import pose_deviations
-from scanweld.sensor.model import SensorModel
 
 MAX_UNDECIDED_CONFIDENCE = 0.49
 """Most confidence in a pose that what was seen leaves open: it slides, another fits as well, or too
@@ -54,21 +53,6 @@ class Confidence:
     deviations: Mapping[int, PoseTolerance] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class Joints:
-    """What is known of placed scans beside their pairs.
-
-    Attributes:
-        homes: The component that each is in, looked at as a whole.
-        deviations: Standard deviations of their poses.
-        sensor: What the set says of its sensor.
-    """
-
-    homes: Mapping[int, JointEvidence]
-    deviations: Mapping[int, PoseTolerance]
-    sensor: SensorModel
-
-
 def assess(
     graph: ViewGraph, diagnostics: PairDiagnostics, calibration: Calibration, config: Config
 ) -> Confidence:
@@ -95,8 +79,7 @@ def assess(
         if chosen is not None:
             judged = result, chosen
             pairs[edge] = _assess_pair(*judged, graph, homes, diagnostics, calibration, config)
-    joints = Joints(homes=homes, deviations=deviations, sensor=sensor)
-    scans = _assess_scans(graph, joints, pairs, calibration, config)
+    scans = _assess_scans(graph, homes, pairs, calibration, config)
     return Confidence(pairs=pairs, scans=scans, bounds=bounds, deviations=deviations)
 
 
@@ -155,7 +138,7 @@ def _assess_pair(
     at_contours = is_accepted or chosen.score > MIN_COHERENT_SCORE
     fit = diagnostics.fit(result.i, result.j, chosen.i_from_j, at_contours=at_contours)
     told = diagnostics.judge.pair(result.i, result.j, chosen.i_from_j)
-    grounds = pair_grounds(result, chosen, told, fit, joint, is_accepted, diagnostics.sensor)
+    grounds = pair_grounds(result, chosen, told, fit, joint, is_accepted)
     probability = calibration.pair.probability(grounds)
     probability = cap_undecided(probability, result, grounds, config)
     if result.rests_on_feature:
@@ -165,7 +148,7 @@ def _assess_pair(
 
 def _assess_scans(
     graph: ViewGraph,
-    joints: Joints,
+    homes: Mapping[int, JointEvidence],
     pairs: Mapping[Edge, Assessed],
     calibration: Calibration,
     config: Config,
@@ -176,14 +159,7 @@ def _assess_scans(
         tied = ties_of(component, {edge: pair.confidence for edge, pair in accepted.items()})
         for k in sorted(component.poses):
             own = [pair.grounds["coherence"] for edge, pair in accepted.items() if k in edge]
-            grounds = scan_grounds(
-                k,
-                joints.homes[k],
-                tied[k],
-                max(own, default=0.0),
-                joints.deviations[k].shift,
-                joints.sensor,
-            )
+            grounds = scan_grounds(k, homes[k], tied[k], max(own, default=0.0))
             confidence = cap_by_links(calibration.scan.probability(grounds), grounds, config)
             scans[k] = Assessed(confidence=confidence, grounds=grounds)
     return scans

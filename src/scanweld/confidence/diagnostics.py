@@ -23,8 +23,9 @@ class Fit:
 
     Attributes:
         observability: Smallest over largest eigenvalue of the information.
-        residual: Rms of the point-to-plane residuals over the tolerance; 1 where there are none.
-        misfit: What is left of that when noise is averaged out, over the tolerance.
+        residual: Rms of the point-to-plane residuals over what the sensor leaves of them where
+            surfaces coincide (``SensorModel.sigma``); 1 where there are none.
+        misfit: What is left of them when noise is averaged out, over the same.
         coherence: Share of the contours that cohere.
     """
 
@@ -53,11 +54,12 @@ class PairDiagnostics:
     def fit(self, i: int, j: int, i_from_j: Pose, *, at_contours: bool) -> Fit:
         """How two scans fit at a pose; where contours are not asked about, none cohere."""
         fields, size = self.judge.fields, (self.judge.tolerance, self.judge.diameter)
+        off = pair_misfit(self.sources[i], self.sources[j], i_from_j, *size)
         information, rms, _ = information_of(fields[i], fields[j], i_from_j, *size)
         return Fit(
             observability=observability_of(information),
-            residual=over(rms, self.judge.tolerance),
-            misfit=pair_misfit(self.sources[i], self.sources[j], i_from_j, *size),
+            residual=over(rms, self.sensor.sigma),
+            misfit=over(off, self.sensor.sigma),
             coherence=self.contours.coherence(i, j, i_from_j) if at_contours else 0.0,
         )
 
@@ -74,6 +76,6 @@ def diagnostics_of(
     )
 
 
-def over(rms: float, tolerance: float) -> float:
-    """A residual over the tolerance; 1 where there is none."""
-    return rms / tolerance if rms == rms else 1.0
+def over(residual: float, sigma: float) -> float:
+    """A residual over the sensor's standard deviation; 1 where there is none."""
+    return residual / sigma if residual == residual and sigma > 0 else 1.0

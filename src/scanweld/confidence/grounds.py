@@ -11,14 +11,13 @@ from scanweld.confidence.diagnostics import Fit
 from scanweld.confidence.joint_evidence import MIN_CONDUCTANCE, JointEvidence
 from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
-from scanweld.sensor.model import SensorModel
 
 Grounds = Mapping[str, float]
 
 LEAST_SHARE = 1e-3
-LEAST_LENGTH = 1e-6
 LEAST_OBSERVABILITY = 1e-7
-MAX_MISFIT = 2.0
+MAX_RATIO = 10.0
+"""Of residuals over what the sensor leaves of them, or the inverse: beyond, all say the same."""
 MAX_CONTRADICTION = 2.0
 MIN_CORROBORATION = MIN_CONDUCTANCE
 """Conductance between two scans below which other pairs do not hold them together."""
@@ -31,7 +30,6 @@ def pair_grounds(
     fit: Fit,
     joint: JointEvidence | None,
     is_accepted: bool,
-    sensor: SensorModel,
 ) -> Grounds:
     """Grounds to believe one pose of a pair.
 
@@ -45,7 +43,6 @@ def pair_grounds(
         fit: How the two scans lie on each other in it.
         joint: The component that both scans are in, if they are in one.
         is_accepted: Whether the pose agrees with the component's.
-        sensor: What the set says of its sensor.
     """
     observability = fit.observability
     margin = margin_among(chosen, result.alternatives)
@@ -68,12 +65,11 @@ def pair_grounds(
         "refutation": refutation,
         "observability": float(np.log10(max(observability, LEAST_OBSERVABILITY))),
         "coherence": fit.coherence,
-        "residual": -fit.residual,
-        "misfit": -min(fit.misfit, MAX_MISFIT),
+        "residual": -_magnitude(fit.residual),
+        "misfit": -_magnitude(fit.misfit),
         "support": support,
         "opposition": opposition,
         "consent": consent,
-        "noise": -_magnitude(sensor.sigma, sensor),
     }
 
 
@@ -82,8 +78,6 @@ def scan_grounds(
     joint: JointEvidence,
     link: float,
     coherence: float,
-    deviation: float,
-    sensor: SensorModel,
 ) -> Grounds:
     """Grounds to believe the place of a scan in its component.
 
@@ -92,8 +86,6 @@ def scan_grounds(
         joint: Its component.
         link: How surely pairs tie it to the reference scan.
         coherence: The best contour coherence of its accepted pairs.
-        deviation: Standard deviation of its place by information and noise, in the scans' unit.
-        sensor: What the set says of its sensor.
     """
     said, fit = joint.said_of(k), joint.fits[k]
     agree, patches = sum(e.agree for e in said), sum(e.patches for e in said)
@@ -105,17 +97,15 @@ def scan_grounds(
         "refutation": joint.refutations[k],
         "observability": float(np.log10(max(fit.observability, LEAST_OBSERVABILITY))),
         "coherence": coherence,
-        "residual": -fit.residual,
-        "misfit": -min(fit.misfit, MAX_MISFIT),
+        "residual": -_magnitude(fit.residual),
+        "misfit": -_magnitude(fit.misfit),
         "link": link,
-        "noise": -_magnitude(sensor.sigma, sensor),
-        "deviation": -_magnitude(deviation, sensor),
     }
 
 
-def _magnitude(length: float, sensor: SensorModel) -> float:
-    """Of a length beside the diameter, as a power of ten."""
-    return float(np.log10(max(length / sensor.diameter, LEAST_LENGTH)))
+def _magnitude(ratio: float) -> float:
+    """As a power of ten, within bounds."""
+    return float(np.log10(np.clip(ratio, 1.0 / MAX_RATIO, MAX_RATIO)))
 
 
 def is_corroborated(support: float) -> bool:

@@ -155,8 +155,8 @@ def _fit(k: int, poses: Poses, diagnostics: PairDiagnostics) -> Fit:
     ]
     return Fit(
         observability=observability_of(information),
-        residual=over(rms, tolerance),
-        misfit=misfit(np.concatenate(patches)) / tolerance,
+        residual=over(rms, diagnostics.sensor.sigma),
+        misfit=over(misfit(np.concatenate(patches)), diagnostics.sensor.sigma),
         coherence=0.0,
     )
 

@@ -28,7 +28,7 @@ REACH_TOLERANCES = 2.0
 def pair_misfit(
     i: SurfaceSource, j: SurfaceSource, i_from_j: Pose, tolerance: float, diameter: float
 ) -> float:
-    """Systematic misfit of two scans at a pose, over the tolerance.
+    """Systematic misfit of two scans at a pose, in the scans' unit.
 
     Args:
         i: Surface of the first scan.
@@ -37,7 +37,7 @@ def pair_misfit(
         tolerance: Depth tolerance of the evidence, in the scans' unit.
         diameter: Diameter of the run.
     """
-    return misfit(two_way_offsets(i, j, i_from_j, tolerance, diameter)) / tolerance
+    return misfit(two_way_offsets(i, j, i_from_j, tolerance, diameter))
 
 
 def two_way_offsets(

@@ -1,6 +1,6 @@
 """A scan laid out for the compiled kernels: what its sensor saw, and its closest points."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,18 @@ def make_field(scan: PreparedScan) -> ScanField:
         closest=closest,
         origin=origin,
     )
+
+
+def with_margin(field: ScanField, margin: float) -> ScanField:
+    """The scan as if its silhouette lay farther out: what is nearer to it is unknown, not free.
+
+    Args:
+        field: The scan.
+        margin: How far, at the middle of the scan, in its unit.
+    """
+    raster = field.raster.copy()
+    raster[..., RASTER_OUTSIDE] = np.maximum(raster[..., RASTER_OUTSIDE] - margin, 0.0)
+    return replace(field, raster=raster)
 
 
 def _neighbours(points: FloatArray) -> NDArray[np.int32]:

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.compiled.kernels import njit
-from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, RASTER_NORMAL, ScanField
+from scanweld.evidence.field import (
+    RASTER_DEPTH,
+    RASTER_KIND,
+    RASTER_NORMAL,
+    RASTER_OUTSIDE,
+    ScanField,
+)
 from scanweld.evidence.visibility import pose_rows
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.pose import Pose
@@ -165,7 +171,7 @@ def _is_free_around(raster: NDArray[np.float32], row: int, column: int) -> bool:
         for q in range(column - FREE_MARGIN_PIXELS, column + FREE_MARGIN_PIXELS + 2):
             if not (0 <= p < raster.shape[0] and 0 <= q < raster.shape[1]):
                 return False
-            if raster[p, q, RASTER_KIND] != IS_FREE:
+            if raster[p, q, RASTER_KIND] != IS_FREE or raster[p, q, RASTER_OUTSIDE] <= 0.0:
                 return False
     return True
 

@@ -26,12 +26,14 @@ class Scene:
         judge: Gives the evidence on any pair at any pose.
         features: PA-HKS keypoints of the scans for which something asked for them.
         sensor: What the set says of its sensor; None before its pairs are known.
+        margin: How far from silhouettes the judge takes empty pixels for free, in the scans' unit.
     """
 
     intake: Intake
     judge: Judge
     features: Mapping[int, Features] = field(default_factory=dict)
     sensor: SensorModel | None = None
+    margin: float = 0.0
 
     @property
     def known_sensor(self) -> SensorModel:

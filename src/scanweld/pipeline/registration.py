@@ -171,7 +171,7 @@ def _shared(
 ) -> Shared[PairTask]:
     """What pairs take of their scans, each named after all that it depends on."""
     prepared = scene.intake.prepared
-    names = {k: work_key(what, prepared[k].work_hash, *settings) for k in parts}
+    names = {k: work_key(what, prepared[k].work_hash, *settings, scene.margin) for k in parts}
     return Shared(parts=parts, names=names, of=lambda task: task.edge)
 
 
@@ -190,7 +190,8 @@ def _kept(
     def key(task: PairTask) -> str:
         hashes = [intake.prepared[k].work_hash for k in task.edge]
         return work_key(
-            f"{method.name} {stage}", *hashes, *method.settings, *intake.known.start_key(task.edge)
+            *(f"{method.name} {stage}", *hashes, *method.settings),
+            *(*intake.known.start_key(task.edge), scene.margin),
         )
 
     tasks = [

@@ -13,7 +13,7 @@ from scanweld.pipeline.object_cut import cut_scans, with_kept
 from scanweld.pipeline.published import published_method
 from scanweld.pipeline.registration import common_axis, register_pairs
 from scanweld.pipeline.robust import robust_method
-from scanweld.pipeline.sensing import learnt
+from scanweld.pipeline.sensing import as_silhouettes_allow, learnt
 from scanweld.pipeline.stages import (
     assess_placed,
     check_knowledge,
@@ -90,7 +90,9 @@ def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructio
     """
     scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
     method = METHODS[config.method](scene, config)
-    registered = learnt(register_pairs(scene, method, config, stages), config, stages)
+    registered = register_pairs(scene, method, config, stages)
+    registered = as_silhouettes_allow(registered, method, config, stages)
+    registered = learnt(registered, config, stages)
     scene = registered.scene
     axis = common_axis(scene, registered.pairs, config)
     graph = place_scans(registered, axis, method, config, stages)

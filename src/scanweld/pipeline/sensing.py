@@ -4,15 +4,35 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from scanweld.config import Config
+from scanweld.evidence.field import with_margin
 from scanweld.evidence.sample_patches import violating_patches, with_patches
 from scanweld.graph.view_graph import Edge
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import held_to
-from scanweld.pipeline.method import Scene
-from scanweld.pipeline.registration import Registered
+from scanweld.pipeline.method import Method, Scene
+from scanweld.pipeline.registration import Registered, register_pairs
 from scanweld.sensor.learn import learn_sensor
 from scanweld.sensor.model import SensorModel
+from scanweld.sensor.silhouette import silhouette_margin
 from scanweld.work.stage_log import Stages
+
+
+def as_silhouettes_allow(
+    registered: Registered, method: Method, config: Config, stages: Stages
+) -> Registered:
+    """The pairs of a run, registered anew if its silhouettes are not as exact as its surfaces.
+
+    What empty pixels near cut borders say hides right poses from the search.
+    """
+    scene = registered.scene
+    judge = scene.judge
+    if method.shortcuts is None:
+        return registered
+    margin = silhouette_margin(registered.pairs, judge.fields, judge.diameter, judge.tolerance)
+    if not margin:
+        return registered
+    judge = replace(judge, fields=[with_margin(field, margin) for field in judge.fields])
+    return register_pairs(replace(scene, judge=judge, margin=margin), method, config, stages)
 
 
 def learnt(registered: Registered, config: Config, stages: Stages) -> Registered:
@@ -31,6 +51,7 @@ def learnt(registered: Registered, config: Config, stages: Stages) -> Registered
             judge.tolerance,
             config.pairs.max_contradiction,
         )
+        sensor = replace(sensor, margin=scene.margin)
         counts["certain"] = sensor.num_certain
         judge = replace(
             judge, tolerance=sensor.tolerance, max_contradiction=sensor.max_contradiction

@@ -131,9 +131,10 @@ def _excess_scatter(
         pairs.setdefault((min(term.i, term.j), max(term.i, term.j)), []).append(term)
     ratios = []
     for (i, j), both in pairs.items():
-        _, steps, spreads = _solve(both, [i, j], centres, arm)
-        ratios.append(abs(float(steps[0] - steps[1])) / (2.0 * float(spreads[0])))
-    return max(1.0, MAD_TO_SIGMA * float(np.median(ratios)))
+        if any(term.weights.any() for term in both):
+            _, steps, spreads = _solve(both, [i, j], centres, arm)
+            ratios.append(abs(float(steps[0] - steps[1])) / (2.0 * float(spreads[0])))
+    return max(1.0, MAD_TO_SIGMA * float(np.median(ratios))) if ratios else 1.0
 
 
 def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:

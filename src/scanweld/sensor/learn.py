@@ -12,22 +12,11 @@ from scanweld.evidence.information import two_way_matches
 from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
+from scanweld.sensor.certain import Edge, certain_pairs
 from scanweld.sensor.model import SensorModel
 
-Edge = tuple[int, int]
-
-CERTAIN_AGREE, CERTAIN_VIOLATED = 0.25, 0.15
-"""A certain pair agrees on so much; of that, so little lies before a surface or contradicts it."""
-CERTAIN_MARGIN, CERTAIN_OBSERVABILITY = 0.4, 1e-3
-"""It beats its rivals by this share, and slides nowhere."""
-MAX_CERTAIN = 60
-"""Pairs that are learnt from, the best first: more say the same."""
 MIN_CERTAIN = 2
 """Fewer say nothing of the set's silhouettes."""
-MAX_LOOKED_PAST = 0.1
-"""If half of the certain pairs show parts in free space of more than this, over what agrees, then
-silhouettes are borders of what was kept. Honest ones have a median of 0.00 to 0.05, trimmed range
-maps of 0.14 to 0.4."""
 REACH_DIAMETERS = 0.04
 """Farthest that surfaces that should coincide may lie apart."""
 TOLERANCE_SIGMAS = 5.0
@@ -58,10 +47,7 @@ def learn_sensor(
         usual_tolerance: Depth tolerance, at least, in the scans' unit.
         usual_contradiction: Limit of violating patches over what agrees, at least.
     """
-    certain = sorted(
-        (pair for pair in pairs.values() if _is_certain(pair)),
-        key=lambda pair: (-pair.alternatives[0].score, pair.i, pair.j),
-    )[:MAX_CERTAIN]
+    certain = certain_pairs(pairs.values())
     found = [_residuals(pair, fields, diameter) for pair in certain]
     residuals = np.concatenate([[], *(each for each, _ in found)])
     if len(residuals) == 0:
@@ -77,9 +63,8 @@ def learn_sensor(
         )
     sigma = 1.4826 * float(np.median(np.abs(residuals)))
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
-    limit, past = usual_contradiction, 0.0
+    limit = usual_contradiction
     if len(certain) >= MIN_CERTAIN:
-        past = float(np.median([_looked_past(pair) for pair in certain]))
         shown = [pair.alternatives[0].evidence.contradiction for pair in certain]
         limit += float(np.quantile(shown, USUAL_SPREAD))
     return SensorModel(
@@ -92,26 +77,6 @@ def learn_sensor(
         ),
         max_contradiction=min(limit, MAX_CONTRADICTION),
         diameter=diameter,
-        is_trimmed=past > MAX_LOOKED_PAST,
-    )
-
-
-def _looked_past(pair: PairResult) -> float:
-    """Largest part that faces a sensor which looked past it, over what agrees."""
-    told = pair.alternatives[0].evidence
-    return told.free_patch / told.agree
-
-
-def _is_certain(pair: PairResult) -> bool:
-    """Whether surfaces alone leave no doubt of a pair."""
-    if pair.best is None:
-        return False
-    told = pair.best.evidence
-    return (
-        told.agree >= CERTAIN_AGREE
-        and told.front + told.contradict <= CERTAIN_VIOLATED * told.agree
-        and pair.observability >= CERTAIN_OBSERVABILITY
-        and pair.margin >= CERTAIN_MARGIN
     )
 
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-TRIMMED = (
-    "the scans' borders cut through the surface, as of trimmed scans, so that empty pixels speak "
-    "less against a pose"
+MARGIN = (
+    "empty pixels nearer than {:.1%} to the border of what a scan shows say nothing: right poses "
+    "put surface there, as of scans that were trimmed or lost their edges"
 )
 
 
@@ -22,7 +22,8 @@ class SensorModel:
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
         diameter: Of the run.
-        is_trimmed: Whether borders cut through the surface, so that silhouettes are none.
+        margin: Distance from silhouettes within which empty pixels say nothing; 0 where silhouettes
+            are as exact as the surfaces.
     """
 
     num_certain: int
@@ -32,7 +33,7 @@ class SensorModel:
     tolerance: float
     max_contradiction: float
     diameter: float
-    is_trimmed: bool = False
+    margin: float = 0.0
 
     def words(self) -> str:
         """The same in a sentence."""
@@ -44,5 +45,5 @@ class SensorModel:
             f"from {pairs}: surfaces lie {self.sigma / diameter:.2%} of the diameter apart "
             f"({self.white / diameter:.2%} noise, {self.correlated / diameter:.2%} shared by "
             f"neighbours); depth is compared to within {self.tolerance / diameter:.1%}"
-            + (f"; {TRIMMED}" if self.is_trimmed else "")
+            + (f"; {MARGIN.format(self.margin / diameter)}" if self.margin else "")
         )

@@ -67,6 +67,8 @@ class Stages:
         with telling(self.progress, name) as counts:
             yield counts
         seconds = time.perf_counter() - start
+        if name in self.reports:
+            seconds += self.reports[name].seconds
         self.reports[name] = StageReport(seconds=seconds, peak_mb=peak_memory_mb(), counts=counts)
         told = ", ".join(f"{key} {value}" for key, value in counts.items())
         logger.info("%s: %s (%.1f s)", name, told, seconds)
