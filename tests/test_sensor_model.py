@@ -54,7 +54,7 @@ def test_exact_scans_are_judged_as_usual_and_nothing_is_learnt_from_what_is_not_
     sensor = learnt(pair, result, result)
     assert sensor.num_certain == 2
     assert sensor.tolerance == USUAL * pair.diameter
-    assert 0.1 <= sensor.max_contradiction < 0.12 and not sensor.is_trimmed
+    assert 0.1 <= sensor.max_contradiction < 0.12 and sensor.margin == 0.0
     assert sensor.sigma < 0.003 * pair.diameter
     assert "2 certain pairs" in sensor.words()
     doubtful = replace(result, margin=0.3)

@@ -14,11 +14,13 @@ from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
+from scanweld.graph.apart import why_apart
 from scanweld.graph.doubts import DoubtCode
 from scanweld.graph.reasons import why_open
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.pairs.result import Alternative, PairResult, weights_of
 from scanweld.pipeline.method import Scene
+from scanweld.pipeline.problem import same_pose
 from scanweld.reconstruction import (
     AlternativeReport,
     DoubtReport,
@@ -55,7 +57,8 @@ def conclude(
         report = _scan_report(k, scene, graph)
         report = _with_confidence(report, confidence.scans.get(k))
         scans[scan.name] = _with_bound(report, k, confidence)
-    verdict, reasons = _verdict(graph, scans, mesh, facts, config)
+    apart = why_apart(graph, scene.judge.centres, same_pose(scene, config))
+    verdict, reasons = _verdict(graph, scans, mesh, [*_denied(facts), *apart], config)
     return Reconstruction(
         poses=_poses(prepared, graph),
         components=tuple(
@@ -277,18 +280,23 @@ def _bodies(graph: ViewGraph) -> list[str]:
     return told
 
 
-def _verdict(
-    graph: ViewGraph,
-    scans: Mapping[str, ScanReport],
-    mesh: TriangleMesh | None,
-    facts: Sequence[FactReport],
-    config: Config,
-) -> tuple[Verdict, tuple[str, ...]]:
-    denied = [
+def _denied(facts: Sequence[FactReport]) -> list[str]:
+    """Facts of the users that the scans contradict."""
+    return [
         f"the scans contradict what is given ({fact.fact}): {fact.reason}"
         for fact in facts
         if fact.verdict is FactVerdict.CONTRADICTED
     ]
+
+
+def _verdict(
+    graph: ViewGraph,
+    scans: Mapping[str, ScanReport],
+    mesh: TriangleMesh | None,
+    denied: Sequence[str],
+    config: Config,
+) -> tuple[Verdict, tuple[str, ...]]:
+    """The verdict and its reasons, with what speaks against the run as a whole."""
     if not graph.components:
         told = ("no two scans could be registered to each other", *why_open(graph), *denied)
         return Verdict.NOTHING, told
