@@ -80,7 +80,9 @@ def test_what_is_no_model_is_refused():
     with pytest.raises(ValueError, match="knots increase"):
         Curve(knots=np.array([1.0, 1.0]), values=np.array([0.0, 0.5]))
     with pytest.raises(ValueError, match="between 0 and 1"):
-        Model(curves={}, frequencies=Curve(knots=np.array([0.0]), values=np.array([1.2])))
+        Model(curves={}, slope=1.0, offset=0.0, most=1.2)
+    with pytest.raises(ValueError, match="odds never fall"):
+        Model(curves={}, slope=-0.1, offset=0.0, most=1.0)
     with pytest.raises(ValueError, match="the model has"):
         MODELS["pair"].probability({"agree": 1.0})
     document = json.loads(stored_calibration().to_json())

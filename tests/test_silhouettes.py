@@ -50,10 +50,8 @@ def trimmed_pair(share: float) -> PreparedPair:
 def margin_of(pair: PreparedPair) -> float:
     """What the pair says of its silhouettes at the true pose, in diameters."""
     at_truth = pair.problem().evaluate(pair.i_from_j)
-    result = replace(
-        search_quickly(pair.problem()),
-        **{"kind": PairKind.GOOD, "alternatives": (at_truth,), "margin": 1.0},
-    )
+    found = search_quickly(pair.problem())
+    result = replace(found, kind=PairKind.GOOD, alternatives=(at_truth,), margin=1.0)
     least = LEAST * pair.diameter
     return silhouette_margin({(0, 1): result}, pair.fields, pair.diameter, least) / pair.diameter
 
@@ -96,15 +94,15 @@ def test_a_margin_changes_nothing_but_what_is_said_of_free_space():
 def test_certain_are_pairs_whose_surfaces_leave_no_doubt_whatever_free_space_says():
     pair = creature_pair(30)
     found = search_quickly(pair.problem())
-    assert found.best is not None
-    told = found.best.evidence
+    best = found.alternatives[0]
+    told = best.evidence
 
     def is_certain(result: PairResult) -> bool:
         return certain_pairs([result]) == [result]
 
     def with_evidence(**changes: float) -> PairResult:
-        best = replace(found.best, evidence=replace(told, **changes))
-        return replace(found, alternatives=(best, *found.alternatives[1:]))
+        changed = replace(best, evidence=replace(told, **changes))
+        return replace(found, alternatives=(changed, *found.alternatives[1:]))
 
     assert is_certain(found)
     assert is_certain(replace(found, kind=PairKind.CONTRADICTED))

@@ -1,7 +1,7 @@
 """Run the main job on the sets of the calibration, and hold all poses that it names to truth."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,10 @@ from benchmarks.kept import Kept, Result, Unit
 from benchmarks.virtual.scene import Scene
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
-from scanweld.evaluation.metrics import evaluate_poses
+from scanweld.evaluation.metrics import Limits, evaluate_poses
+from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
 from scanweld.geometry.gauss_newton import lever_arm
+from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet
 from scanweld.pipeline.run import run
 from scanweld.reconstruction import Reconstruction
@@ -21,6 +23,8 @@ from scanweld.reconstruction import Reconstruction
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
 """The defaults; nobody looks at the model."""
 NUM_SETS, NUM_QUICK = 280, 4
+SAME_ANSWER = Limits(RIVAL_ANGLE_DEG, 100.0 * RIVAL_SHIFT_DIAMETERS)
+"""Poses that differ by less are no rivals."""
 
 
 @dataclass(kw_only=True)
@@ -47,7 +51,7 @@ class Sets(Kept):
                 **{"i": pair.i, "j": pair.j, "kind": str(pair.kind)},
                 **{"observability": pair.observability, "accepted": pair.accepted},
                 "grounds": dict(pair.grounds),
-                "right": is_right_pair(pair.i, pair.j, pair.i_from_j, scene),
+                "right": _is_right(pair.i, pair.j, pair.i_from_j, scene),
             }
             for pair in found.pairs
             if pair.i_from_j is not None
@@ -56,16 +60,27 @@ class Sets(Kept):
         return {"pairs": pairs, "scans": scans}
 
 
+def _is_right(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool | None:
+    """Whether a pose between two scans is right; None if it is the same answer, but inexact.
+
+    How exact poses are is for the bounds to say.
+    """
+    if is_right_pair(i, j, i_from_j, scene):
+        return True
+    is_near = is_right_pair(i, j, i_from_j, replace(scene, limits=SAME_ANSWER))
+    return None if is_near else False
+
+
 def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
     """Placed scans. Right are the most that agree with each other, if they are two or more."""
     records = []
     for number, component in enumerate(found.components):
-        core = _largest_agreeing(found, component, scene)
+        right = _as_most_see(found, component, scene)
         records += [
             {
                 **{"name": name, "component": number, "reference": name == component[0]},
                 "grounds": dict(found.scans[name].grounds),
-                "right": name in core,
+                "right": right[name],
             }
             for name in component
         ]
@@ -75,7 +90,7 @@ def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
 def _with_errors(
     records: list[dict[str, Any]], found: Reconstruction, scene: Scene
 ) -> list[dict[str, Any]]:
-    """Records of right scans with their errors, and the deviations their bounds are made of."""
+    """Records of scans that are not wrong with their errors, and what their bounds are made of."""
     estimate = PoseSet(poses=dict(found.poses), components=found.components)
     errors = evaluate_poses(
         estimate, scene.truth, centroids=scene.centroids, diameter=scene.diameter
@@ -84,7 +99,7 @@ def _with_errors(
         error, report = errors.scans.get(record["name"]), found.scans[record["name"]]
         if found.sensor is None or error is None or report.deviation is None:
             continue
-        if record["right"] and np.isfinite(error.rotation_deg):
+        if record["right"] is not False and np.isfinite(error.rotation_deg):
             diameter, sigma = found.sensor.diameter, found.sensor.sigma
             turns = error.rotation_deg, report.deviation_deg
             record["errors"] = {
@@ -96,14 +111,20 @@ def _with_errors(
     return records
 
 
-def _largest_agreeing(
+def _as_most_see(
     found: Reconstruction, component: Sequence[str], scene: Scene
-) -> frozenset[str]:
-    """The most scans of a component that are right as one of them sees it; none if it is alone."""
+) -> dict[str, bool | None]:
+    """Which scans of a component are right as the one sees it with which most agree."""
 
-    def agree(i: str, j: str) -> bool:
-        return is_right_pair(i, j, found.poses[i].inverse() @ found.poses[j], scene)
+    def seen_from(i: str) -> dict[str, bool | None]:
+        return {
+            j: _is_right(i, j, found.poses[i].inverse() @ found.poses[j], scene)
+            for j in component
+            if j != i
+        }
 
-    beside = {i: frozenset(j for j in component if j != i and agree(i, j)) for i in component}
-    largest = max(component, key=lambda i: len(beside[i]))
-    return beside[largest] | {largest} if beside[largest] else frozenset()
+    seen = {i: seen_from(i) for i in component}
+    best = max(component, key=lambda i: sum(right is True for right in seen[i].values()))
+    if not any(seen[best].values()):
+        return dict.fromkeys(component, False)
+    return {**seen[best], best: True}

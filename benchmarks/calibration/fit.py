@@ -1,4 +1,4 @@
-"""Fit the calibrated model: curves that never fall, and frequencies counted on held-out objects."""
+"""Fit the calibrated model: curves that never fall, and odds by held-out objects."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
@@ -15,8 +15,6 @@ QUANTILES = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
 PENALTY = 1.0
 """Of the squares of the curves' steps: steep only where many examples ask for it."""
 NUM_FOLDS = 5
-MIN_COUNTED = 20
-"""Examples behind each frequency, at least."""
 
 
 class Examples(NamedTuple):
@@ -25,16 +23,21 @@ class Examples(NamedTuple):
     names: tuple[str, ...]  # Of the F grounds
     grounds: FloatArray  # (N, F)
     is_right: BoolArray  # (N,)
+    is_known: BoolArray  # (N,) whether it is right or wrong; nothing is learnt from the others
     groups: IntArray  # (N,) number of the set that each comes from: sets have their own objects
 
     @classmethod
     def of(
-        cls, rows: Sequence[Mapping[str, float]], is_right: Sequence[bool], groups: Sequence[int]
+        cls,
+        rows: Sequence[Mapping[str, float]],
+        is_right: Sequence[bool | None],
+        groups: Sequence[int],
     ) -> Self:
-        """From named grounds."""
+        """From named grounds; None is what is neither right nor wrong."""
         names = tuple(rows[0])
         grounds = np.array([[row[name] for name in names] for row in rows])
-        return cls(names, grounds, np.array(is_right, dtype=bool), np.array(groups))
+        is_known = np.array([right is not None for right in is_right])
+        return cls(names, grounds, np.array(is_right, dtype=bool), is_known, np.array(groups))
 
     def rows(self) -> list[dict[str, float]]:
         """The grounds of each, by name."""
@@ -42,7 +45,13 @@ class Examples(NamedTuple):
 
     def only(self, kept: BoolArray) -> "Examples":
         """Some of them."""
-        return Examples(self.names, self.grounds[kept], self.is_right[kept], self.groups[kept])
+        return Examples(
+            self.names,
+            self.grounds[kept],
+            self.is_right[kept],
+            self.is_known[kept],
+            self.groups[kept],
+        )
 
     def without(self, name: str) -> "Examples":
         """All of them, one ground left out."""
@@ -52,14 +61,16 @@ class Examples(NamedTuple):
 
 
 def fit(examples: Examples) -> Model:
-    """Curves from all examples; frequencies of sums that curves from other objects gave."""
+    """Curves from all examples; odds by the sums that curves from other objects gave."""
+    examples = examples.only(examples.is_known)
     totals = np.zeros(len(examples.groups))
     for fold in folds(examples):
         curves, held_out = fit_curves(examples.only(~fold)), examples.only(fold)
         columns = zip(examples.names, held_out.grounds.T, strict=True)
         totals[fold] = np.sum([curves[name].at(column) for name, column in columns], axis=0)
-    frequencies = count_frequencies(totals, examples.is_right)
-    return Model(curves=fit_curves(examples), frequencies=frequencies)
+    slope, offset = log_odds(totals, examples.is_right)
+    most = best_supported(totals, examples.is_right)
+    return Model(curves=fit_curves(examples), slope=slope, offset=offset, most=most)
 
 
 def held_out_probabilities(examples: Examples) -> FloatArray:
@@ -103,20 +114,28 @@ def fit_curves(examples: Examples) -> dict[str, Curve]:
     return {name: Curve(knots=at, values=value) for name, at, value in named}
 
 
-def count_frequencies(totals: FloatArray, is_right: BoolArray) -> Curve:
-    """How often what has such a sum is right: isotonic regression of Laplace's estimate."""
-    order = np.argsort(totals, kind="stable")
-    pools: list[FloatArray] = []  # Sum, number right, number
-    for part in np.array_split(order, max(len(totals) // MIN_COUNTED, 1)):
-        pools.append(np.array([totals[part].sum(), is_right[part].sum(), len(part)]))
-        while len(pools) > 1 and not np.all(_point(pools[-2]) < _point(pools[-1])):
-            last = pools.pop()
-            pools[-1] = pools[-1] + last
-    places, frequencies = np.array([_point(pool) for pool in pools]).T
-    return Curve(knots=places, values=frequencies)
+def log_odds(totals: FloatArray, is_right: BoolArray) -> tuple[float, float]:
+    """Slope and offset of the logarithm of the odds with the sum, by maximum likelihood.
+
+    Each example counts as right with a probability that leaves it a doubt, one more success and
+    one more failure being added to those seen (Platt 1999).
+    """
+    right = int(is_right.sum())
+    wrong = len(is_right) - right
+    aimed_at = np.where(is_right, (right + 1) / (right + 2), 1 / (wrong + 2))
+
+    def loss(w: FloatArray) -> tuple[float, FloatArray]:
+        logit = w[0] * totals + w[1]
+        pull = expit(logit) - aimed_at
+        value = np.logaddexp(0.0, logit).sum() - aimed_at @ logit
+        return float(value), np.array([pull @ totals, pull.sum()])
+
+    limits = [(0.0, None), (None, None)]
+    slope, offset = minimize(loss, [1.0, 0.0], jac=True, method="L-BFGS-B", bounds=limits).x
+    return float(slope), float(offset)
 
 
-def _point(pool: FloatArray) -> FloatArray:
-    """Mean sum and frequency of examples that are counted together."""
-    total, right, count = pool
-    return np.array([total / count, (right + 1) / (count + 2)])
+def best_supported(totals: FloatArray, is_right: BoolArray) -> float:
+    """Largest of Laplace's estimates for all examples from some sum on."""
+    right = np.cumsum(is_right[np.argsort(-totals, kind="stable")])
+    return float(((right + 1) / (np.arange(len(right)) + 3)).max())

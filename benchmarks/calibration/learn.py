@@ -53,7 +53,7 @@ def learn(records: Sequence[Record], command: str) -> Learned:
     digest = hashlib.sha256(json.dumps([record.result for record in records]).encode())
     made = {
         **{"command": command, "code": code_digest(CALIBRATED), "sets": len(records)},
-        **{"pairs": len(pairs.groups), "scans": len(scans.groups)},
+        **{"pairs": int(pairs.is_known.sum()), "scans": int(scans.is_known.sum())},
         "digest": digest.hexdigest()[:16],
     }
     return Learned(
@@ -62,9 +62,15 @@ def learn(records: Sequence[Record], command: str) -> Learned:
         ),
         pairs=pairs,
         scans=scans,
-        stated_pairs=Stated(np.array(confidences), pairs.is_right),
-        stated_scans=Stated(np.array(held), scans.is_right),
+        stated_pairs=_stated(confidences, pairs),
+        stated_scans=_stated(held, scans),
     )
+
+
+def _stated(confidences: Sequence[float], examples: Examples) -> Stated:
+    """The confidences of what is right or wrong."""
+    known = examples.is_known
+    return Stated(np.array(confidences)[known], examples.is_right[known])
 
 
 def _as_told(pair: Mapping[str, Any]) -> PairResult:
@@ -75,7 +81,7 @@ def _as_told(pair: Mapping[str, Any]) -> PairResult:
 
 def _scan_examples(records: Sequence[Record], pair_confidences: Sequence[float]) -> Examples:
     left = iter(pair_confidences)
-    rows: list[tuple[dict[str, float], bool, int]] = []
+    rows: list[tuple[dict[str, float], bool | None, int]] = []
     for record in records:
         pairs, scans = record.result["pairs"], record.result["scans"]
         confidence = {(pair["i"], pair["j"]): next(left) for pair in pairs}

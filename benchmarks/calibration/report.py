@@ -46,7 +46,8 @@ def calibration_told(found: Json) -> Json:
 
 
 def _measures(examples: Examples, stated: Stated, quick: bool) -> Json:
-    less = {} if quick else {name: examples.without(name) for name in examples.names}
+    known = examples.only(examples.is_known)
+    less = {} if quick else {name: known.without(name) for name in examples.names}
     return {
         **{"count": len(stated), "right": stated.num_right},
         **_quality(stated),

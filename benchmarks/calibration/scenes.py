@@ -14,7 +14,6 @@ from benchmarks.virtual.disturbances import Disturbance, each, in_turn
 from benchmarks.virtual.scene import BASIN, HIDDEN_PIXELS, Scene, posed, with_mark_seen
 from benchmarks.virtual.scenery import held_by_hand, on_table, on_turntable
 from benchmarks.virtual.shots import Shot, take_shots
-from scanweld.evaluation.metrics import RIGHT
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evaluation.views import View, view_of
 from scanweld.geometry.scan import principal_diameter
@@ -53,8 +52,7 @@ def make_set(seed: int) -> Scene:
         shots = _harm(body, rng)(shots, rng)
     if rng.random() < STRANGERS:
         shots = [*shots, *_strangers(family, noise, seed, rng)][-MAX_SCANS:]
-    scene = posed(shots, body, _diameter(body), seed)
-    return replace(scene, limits=BASIN if is_stereo else RIGHT)
+    return replace(posed(shots, body, _diameter(body), seed), limits=BASIN)
 
 
 def _diameter(body: Body) -> float:

@@ -8,7 +8,13 @@ import trimesh
 
 from benchmarks.blocks import rendered
 from benchmarks.calibration.collect import NUM_SETS, Sets
-from benchmarks.calibration.fit import Examples, count_frequencies, fit, held_out_probabilities
+from benchmarks.calibration.fit import (
+    Examples,
+    best_supported,
+    fit,
+    held_out_probabilities,
+    log_odds,
+)
 from benchmarks.calibration.learn import learn
 from benchmarks.calibration.report import calibration_told, measures
 from benchmarks.calibration.scenes import OTHER, make_set
@@ -80,11 +86,22 @@ def test_held_out_probabilities_know_nothing_of_their_set():
 
 def test_few_examples_do_not_make_certain():
     totals, all_right = np.arange(30.0), np.ones(30, dtype=bool)
-    frequencies = count_frequencies(totals, all_right)
-    assert frequencies.values.max() == pytest.approx(31 / 32)
-    assert frequencies.values.min() > 0.5
-    mixed = count_frequencies(np.arange(200.0), np.arange(200) >= 100)
-    assert mixed.values[0] < 0.02 and mixed.values[-1] > 0.98
+    assert best_supported(totals, all_right) == pytest.approx(31 / 32)
+    slope, offset = log_odds(totals - 15.0, all_right)
+    assert slope == pytest.approx(0.0, abs=0.01) and offset == pytest.approx(np.log(31), rel=0.01)
+    first_wrong = best_supported(np.arange(200.0), np.arange(200) >= 100)
+    assert first_wrong == pytest.approx(101 / 102)
+    top_wrong = best_supported(np.arange(200.0), np.arange(200) % 50 != 49)
+    assert top_wrong == pytest.approx(197 / 202), "one in fifty is wrong wherever one looks"
+
+
+def test_odds_are_those_that_examples_have():
+    rng = np.random.default_rng(2)
+    totals = rng.normal(size=20_000)
+    is_right = rng.random(20_000) < 1.0 / (1.0 + np.exp(-(1.7 * totals - 0.6)))
+    slope, offset = log_odds(totals, is_right)
+    assert slope == pytest.approx(1.7, abs=0.1) and offset == pytest.approx(-0.6, abs=0.1)
+    assert log_odds(totals, ~is_right)[0] == 0.0, "more is never worse"
 
 
 def made_record(seed: int) -> Record:

@@ -2,8 +2,8 @@
 
 Each ground has a curve that never falls: better evidence never makes a pose less probable, and
 beyond what was seen in the calibration a curve is flat. The sum of the curves is turned into a
-probability by the frequencies that were counted, one more success and one more failure added to
-each (Laplace), so that no confidence is above what the number of examples supports.
+probability by a logistic function that was fitted to sums of held-out examples (Platt 1999), and
+no confidence is above what the number of examples supports.
 """
 
 import json
@@ -18,7 +18,7 @@ import numpy as np
 from scanweld.confidence.bounds import Bounds, BoundScale
 from scanweld.geometry.arrays import FloatArray, frozen
 
-FORMAT = 2
+FORMAT = 3
 MAX_CONFIDENCE = 0.999
 """No calibration is so large, and so like the scans at hand, that more could be said."""
 _FILE = "calibration.json"
@@ -55,15 +55,21 @@ class Model:
 
     Attributes:
         curves: Of each ground, by name: its part of the sum.
-        frequencies: Of the sum: the probability, between 0 and 1.
+        slope: Of the logarithm of the odds with the sum.
+        offset: Logarithm of the odds where the sum is 0.
+        most: Largest probability that the number of examples supports.
     """
 
     curves: Mapping[str, Curve]
-    frequencies: Curve
+    slope: float
+    offset: float
+    most: float
 
     def __post_init__(self) -> None:
-        if self.frequencies.values[0] < 0 or self.frequencies.values[-1] > 1:
-            raise ValueError("frequencies are between 0 and 1")
+        if self.slope < 0:
+            raise ValueError("odds never fall with the sum of the curves")
+        if not 0 <= self.most <= 1:
+            raise ValueError("a probability is between 0 and 1")
 
     def total(self, grounds: Mapping[str, float]) -> float:
         """The sum of the curves.
@@ -77,7 +83,8 @@ class Model:
 
     def probability(self, grounds: Mapping[str, float]) -> float:
         """Probability that what has these grounds is right, at most ``MAX_CONFIDENCE``."""
-        return min(float(self.frequencies.at(self.total(grounds))), MAX_CONFIDENCE)
+        odds = float(np.exp(self.slope * self.total(grounds) + self.offset))
+        return min(odds / (1.0 + odds), self.most, MAX_CONFIDENCE)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -139,7 +146,7 @@ def stored_calibration() -> Calibration:
 def _model_json(model: Model) -> dict[str, Any]:
     return {
         "curves": {name: _curve_json(curve) for name, curve in model.curves.items()},
-        "frequencies": _curve_json(model.frequencies),
+        **{"slope": model.slope, "offset": model.offset, "most": model.most},
     }
 
 
@@ -150,7 +157,9 @@ def _curve_json(curve: Curve) -> dict[str, list[float]]:
 def _read_model(entry: Mapping[str, Any]) -> Model:
     return Model(
         curves={name: _read_curve(curve) for name, curve in entry["curves"].items()},
-        frequencies=_read_curve(entry["frequencies"]),
+        slope=entry["slope"],
+        offset=entry["offset"],
+        most=entry["most"],
     )
 
 
