@@ -23,7 +23,8 @@ TURN_SCALE = 3.0
 
 
 TwoWayMatches = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-"""Points (N, 3) matched between two scans, both unit normals (N, 3), and the distances (N,)."""
+"""Points (N, 3) matched between two scans, both unit normals (N, 3), and the distances (N,) by
+which the second scan lies before the first, as that one's sensor sees it."""
 
 
 def information_of(
@@ -73,7 +74,7 @@ def observability_of(information: FloatArray) -> float:
 def two_way_matches(i: ScanField, j: ScanField, i_from_j: Pose, radius: float) -> TwoWayMatches:
     """Matches of the samples of each scan on the other, in the frame of i."""
     points, one, other, residuals = _matches(i, j, i_from_j.inverse(), radius)
-    backward = i_from_j.apply(points), i_from_j.turn(one), i_from_j.turn(other), residuals
+    backward = i_from_j.apply(points), i_from_j.turn(one), i_from_j.turn(other), -residuals
     both = zip(_matches(j, i, i_from_j, radius), backward, strict=True)
     points, one, other, residuals = (np.concatenate(column) for column in both)
     return points, one, other, residuals
