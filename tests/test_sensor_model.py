@@ -82,6 +82,31 @@ def test_a_coarser_sensor_is_judged_wider_up_to_a_limit(found: tuple[PreparedPai
     assert USUAL < widths[0] < widths[1] < widths[2] <= 0.03 + 1e-12
 
 
+def test_bent_depth_is_what_neighbours_share_and_noise_is_not(
+    found: tuple[PreparedPair, PairResult],
+):
+    """One scan waves before and behind the other, which says so from the other side."""
+    pair, result = found
+    i, j = pair.fields
+    rng = np.random.default_rng(9)
+    amplitude = 0.006 * pair.diameter
+
+    def told(shifts: FloatArray) -> SensorModel:
+        points = j.points + shifts[:, None] * j.normals
+        targets = j.surface.copy()
+        nearest = np.argmin(np.linalg.norm(targets[:, None, :3] - j.points[None], axis=2), axis=1)
+        targets[:, :3] += shifts[nearest, None] * targets[:, 3:6]
+        moved = replace(j, points=points, surface=targets)
+        return learn_sensor({(0, 1): result}, [i, moved], pair.diameter, USUAL * pair.diameter, 0.1)
+
+    wave = 2 * np.pi * (j.points @ [1.0, 0.7, 0.0]) / (0.5 * pair.diameter)
+    bent = told(amplitude * np.sin(wave))
+    noisy = told(amplitude * rng.normal(size=len(j.points)))
+    assert bent.correlated > 2.0 * bent.white
+    assert bent.correlated == pytest.approx(amplitude / np.sqrt(2), rel=0.4)
+    assert noisy.correlated < 0.5 * noisy.white
+
+
 def test_what_violates_together_counts_and_what_is_scattered_does_not(
     found: tuple[PreparedPair, PairResult],
 ):
