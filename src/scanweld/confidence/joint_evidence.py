@@ -12,7 +12,7 @@ from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.evidence.information import information_from, observability_of, two_way_matches
 from scanweld.evidence.judge import Poses
 from scanweld.evidence.rivals import (
-    MIN_REFUTED_RIVAL_SHARE,
+    MIN_RIVAL_SHARE,
     RIVAL_ANGLE_DEG,
     RIVAL_SHIFT_DIAMETERS,
     as_rival,
@@ -127,7 +127,7 @@ def _standing(
         if not rival.is_contradicted
     ]
     margin = margin_over(here.score, scores)
-    least = max(MIN_AGREE, MIN_REFUTED_RIVAL_SHARE * here.agree)
+    least = max(MIN_AGREE, MIN_RIVAL_SHARE * here.agree)
     return _Standing(
         margin=max(margin, -1.0),
         refutation=refutation([_violated(rival) for rival in rivals if rival.agree >= least]),

@@ -13,8 +13,6 @@ CLEAN_CONTRADICTION = 0.05
 """The same where violations are judged by their patches."""
 MIN_RIVAL_SHARE = 0.35
 """Least agreement of such a rival, as a share of that of the pose: slivers fit in many ways."""
-MIN_REFUTED_RIVAL_SHARE = 0.15
-"""The same of a rival of which one wants to know how much contradicts it."""
 
 
 def margin_over(score: float, rivals: Sequence[float]) -> float:

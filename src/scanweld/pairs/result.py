@@ -9,7 +9,7 @@ import numpy as np
 from scanweld.evidence.evidence import MIN_AGREE, Evidence
 from scanweld.evidence.rivals import (
     CLEAN_CONTRADICTION,
-    MIN_REFUTED_RIVAL_SHARE,
+    MIN_RIVAL_SHARE,
     as_rival,
     margin_over,
     refutation,
@@ -106,7 +106,7 @@ def margin_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> fl
 
 def refutation_among(chosen: Alternative, alternatives: Sequence[Alternative]) -> float:
     """How clearly the others of a pair's poses are refuted."""
-    least = max(MIN_AGREE, MIN_REFUTED_RIVAL_SHARE * chosen.evidence.agree)
+    least = max(MIN_AGREE, MIN_RIVAL_SHARE * chosen.evidence.agree)
     rivals = [other.evidence for other in alternatives if other is not chosen]
     return refutation([told.contradiction for told in rivals if told.agree >= least])
 
