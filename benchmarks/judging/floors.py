@@ -43,10 +43,15 @@ def floors(outcomes: Sequence[Outcome]) -> list[Floor]:
     strangers = [scan for scan in scans if scan.is_stranger]
     return [
         _none(
-            "scans called good that are wrong, or whose pose nothing determines",
-            {f"of {len(good)} good scans, {len(scans)} in all": sum(s.is_false for s in good)},
+            "scans called good in a wrong basin, or whose pose nothing determines",
+            {
+                f"of {len(good)} good scans, {len(scans)} in all": sum(
+                    s.is_false and not s.is_inexact for s in good
+                )
+            },
             outcomes,
         ),
+        _inexact([scan for scan in good if scan.is_inexact], outcomes),
         _asserted(outcomes),
         _none(
             "scans of another object, of noise, mirrored: called good",
@@ -106,6 +111,13 @@ def _none(measure: str, counts: Mapping[str, int], runs: Sequence[Outcome]) -> F
     told = ", ".join(f"{count} {of}" for of, count in counts.items())
     is_met = not any(counts.values())
     return Floor(measure, "0", told + (f" ({bound(len(runs))})" if is_met and runs else ""), is_met)
+
+
+def _inexact(scans: Sequence[ScanOutcome], outcomes: Sequence[Outcome]) -> Floor:
+    """Good scans that are the right answer, but farther off than their scenario allows."""
+    beyond = sum(not scan.is_bounded for scan in scans)
+    counts = {f"scans, {beyond} of them beyond the bounds that are stated": len(scans)}
+    return _none("good scans in the right basin, but farther off than is allowed", counts, outcomes)
 
 
 def _asserted(outcomes: Sequence[Outcome]) -> Floor:

@@ -3,7 +3,8 @@
 A scan is *right* if its pose lies within 3 degrees and 1.5 % of the object's diameter of the truth
 in the largest component that has scans of its world; within 5 degrees and 4 % where the sensor's
 own error moves the best pose. It is *falsely good* if it is called good but
-is not right, or if nothing that it shows determines its pose. A pair is right if its pose lies
+is not right, or if nothing that it shows determines its pose; it is *inexact* if it is nevertheless
+the same answer, within 12 degrees and 6 %, nearer than any rival. A pair is right if its pose lies
 within 5 degrees and 3 % (or 4 %, likewise), and is determined.
 """
 
@@ -15,6 +16,7 @@ from benchmarks.scores import Stated
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Group
 from scanweld.evaluation.metrics import Standing
+from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
 from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import ScanVerdict
 
@@ -70,6 +72,14 @@ class ScanOutcome(NamedTuple):
     def is_false(self) -> bool:
         """Whether it is placed although it is wrong, or although its pose is open."""
         return self.standing == Standing.WRONG or (self.is_open and self.is_placed)
+
+    @property
+    def is_inexact(self) -> bool:
+        """Whether it is wrong by more than is allowed, and yet the same answer: no other basin."""
+        if self.is_open or self.rotation_deg is None or self.translation_percent is None:
+            return False
+        is_near = self.translation_percent <= 100.0 * RIVAL_SHIFT_DIAMETERS
+        return self.is_false and is_near and self.rotation_deg <= RIVAL_ANGLE_DEG
 
     @property
     def is_stranger(self) -> bool:

@@ -27,7 +27,7 @@ from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import Reconstruction, ScanReport, ScanVerdict
 from tests.results import a_pair, a_result
 
-CLEAN, FALSE = "ring of 6", "called good that are wrong"
+CLEAN, FALSE = "ring of 6", "called good in a wrong basin"
 TURN = Pose.exp([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -91,7 +91,7 @@ def test_a_run_that_tells_the_truth_is_right():
     assert told("trust-misses", outcome) == "None.\n"
     assert floor_of([outcome], "AUC").asked == ">= 0.99"
     names = [floor.measure for floor in floors([])]
-    assert len(names) == len(set(names)) == 16
+    assert len(names) == len(set(names)) == 17
 
 
 def test_a_wrong_scan_is_falsely_good_only_if_it_is_called_good():
@@ -104,6 +104,21 @@ def test_a_wrong_scan_is_falsely_good_only_if_it_is_called_good():
     outcome = outcome_of(CLEAN, replace(found, scans={**found.scans, "scan_03": doubtful}))
     assert is_met(outcome, FALSE) and is_met(outcome, "clean") is False
     assert "1 of 6 not right" in told("trust-misses", outcome)
+
+
+def test_what_is_a_little_farther_off_than_allowed_is_no_other_basin():
+    near, far = (Pose.exp([0.0, 0.0, np.radians(turn), 0.0, 0.0, 0.0]) for turn in (6.0, 20.0))
+    scene = scene_of(CLEAN)
+    found = told_as_true(scene)
+    middle = Pose(rotation=np.eye(3), translation=scene.centroids["scan_03"])
+    for turn, is_inexact in ((near, True), (far, False)):
+        about = middle @ turn @ middle.inverse()
+        moved = replace(found, poses={**found.poses, "scan_03": found.poses["scan_03"] @ about})
+        outcome = outcome_of(CLEAN, moved)
+        (wrong,) = (scan for scan in outcome.scans if scan.is_false)
+        assert wrong.is_inexact is is_inexact
+        assert is_met(outcome, FALSE) is is_inexact
+        assert is_met(outcome, "farther off than is allowed") is not is_inexact
 
 
 def test_any_pose_of_a_symmetric_object_is_falsely_good_and_asserted_from_a_half_on():
