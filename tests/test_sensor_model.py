@@ -56,6 +56,8 @@ def test_exact_scans_are_judged_as_usual_and_nothing_is_learnt_from_what_is_not_
     assert sensor.tolerance == USUAL * pair.diameter
     assert 0.1 <= sensor.max_contradiction < 0.12 and sensor.margin == 0.0
     assert sensor.sigma < 0.003 * pair.diameter
+    middle = len(sensor.spread) // 2
+    assert sum(sensor.spread[middle - 4 : middle + 5]) > 0.55 * sum(sensor.spread) > 100
     assert "2 certain pairs" in sensor.words()
     doubtful = replace(result, margin=0.3)
     none = learnt(pair, doubtful)

@@ -56,9 +56,11 @@ class StageEntry(Entry):
 
 
 class SensorEntry(Entry):
-    """What report.json says of the sensor, in a sentence."""
+    """What report.json says of the sensor, in a sentence, and how far surfaces lie apart."""
 
     words: str
+    sigma: float = 0.0
+    spread: tuple[int, ...] = ()
 
 
 class Report(Entry):

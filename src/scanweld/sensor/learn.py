@@ -13,7 +13,7 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.certain import Edge, certain_pairs
-from scanweld.sensor.model import SensorModel
+from scanweld.sensor.model import NUM_SPREAD_BINS, SPREAD_SIGMAS, SensorModel
 
 MIN_CERTAIN = 2
 """Fewer say nothing of the set's silhouettes."""
@@ -77,7 +77,17 @@ def learn_sensor(
         ),
         max_contradiction=min(limit, MAX_CONTRADICTION),
         diameter=diameter,
+        spread=_spread(residuals, sigma),
     )
+
+
+def _spread(residuals: FloatArray, sigma: float) -> tuple[int, ...]:
+    """The residuals (N,), counted."""
+    if sigma <= 0.0:
+        return ()
+    limits = (-SPREAD_SIGMAS * sigma, SPREAD_SIGMAS * sigma)
+    counts, _ = np.histogram(residuals, NUM_SPREAD_BINS, range=limits)
+    return tuple(counts.tolist())
 
 
 def _residuals(

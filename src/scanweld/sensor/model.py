@@ -6,6 +6,8 @@ MARGIN = (
     "empty pixels nearer than {:.1%} to the border of what a scan shows say nothing: right poses "
     "put surface there, as of scans that were trimmed or lost their edges"
 )
+SPREAD_SIGMAS, NUM_SPREAD_BINS = 5.0, 41
+"""How far the spread of the distances is told, in standard deviations, and in how many bins."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -24,6 +26,8 @@ class SensorModel:
         diameter: Of the run.
         margin: Distance from silhouettes within which empty pixels say nothing; 0 where silhouettes
             are as exact as the surfaces.
+        spread: Distances between surfaces that should coincide, counted in equal bins from
+            ``SPREAD_SIGMAS`` standard deviations behind each other to as many before.
     """
 
     num_certain: int
@@ -34,6 +38,7 @@ class SensorModel:
     max_contradiction: float
     diameter: float
     margin: float = 0.0
+    spread: tuple[int, ...] = ()
 
     def words(self) -> str:
         """The same in a sentence."""

@@ -38,6 +38,7 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.geometry.shading import Side
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanVerdict
+from scanweld.sensor.model import SPREAD_SIGMAS
 
 LONGEST_LABEL = 9
 """Where names are longer, without what they all begin with, the scans are called by numbers."""
@@ -162,7 +163,8 @@ def _outcome(model: ModelFolder) -> dict[str, Any]:
         "scans_have_bounds": any(
             scan.translation_bound is not None for scan in report.scans.values()
         ),
-        "sensor_words": None if report.sensor is None else report.sensor.words,
+        "sensor": report.sensor,
+        "spread_sigmas": SPREAD_SIGMAS,
         "seconds": sum(stage.seconds for stage in report.stages.values()),
         "peak_mb": max((stage.peak_mb for stage in report.stages.values()), default=None),
         "most_seconds": max((stage.seconds for stage in report.stages.values()), default=0) or 1,
