@@ -303,6 +303,8 @@ BROKEN = {
     ),
     "none.mlp": "<MeshLabProject><MeshGroup/></MeshLabProject>",
     "cut.aln": "2\na.ply\n#\n" + ROWS,
+    "long.aln": "9" * 5000 + "\na.ply\n#\n" + ROWS,
+    "huge.aln": "1\na.ply\n#\n" + ROWS.replace("-1", "-1e300"),
     "scaled.aln": "1\na.ply\n#\n2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n0\n",
     "mirror.aln": "1\na.ply\n#\n-1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n0\n",
     "words.conf": "bmesh a.ply 1 2 3 0 0 1\n",

@@ -6,6 +6,7 @@ import sys
 import zipfile
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -291,6 +292,9 @@ def test_bombs_are_refused(tmp_path: Path):
         ("a.pcd", pcd_binary().replace(b"WIDTH 7", b"WIDTH 0"), "WIDTH x HEIGHT"),
         ("a.xyz.gz", gzip.compress(b"0 0 0\n")[:-3], "cannot be unpacked"),
         ("a.gz", gzip.compress(b"0 0 0\n"), "unknown format"),
+        ("a.xyz.gz", gzip.compress(b""), "holds no points"),
+        ("a.obj", b"v 0 0 0\nf 1 1 " + b"9" * 30, "line 2: .* is broken"),
+        ("a.ply", SAMPLES["organised.ply"]().replace(b"end_h", b"element vertex 0\nend_h"), "two"),
         ("a.npy", npy(surface())[:-1], "truncated"),
         ("a.npy", npy(np.zeros((4, 5))), r"shape \(4, 5\)"),
         ("a.npy", npy(np.array([{}])), "save the points as numbers"),
@@ -367,11 +371,68 @@ def test_what_meshio_writes_as_vtk_is_read(form: str, is_binary: bool, tmp_path:
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", sorted(set(fuzz.samples()) - {"a.xyz"}))
+@pytest.mark.parametrize("name", fuzz.samples())
 def test_mutated_files_are_read_or_refused(name: str, tmp_path: Path):
     data = fuzz.samples()[name]()
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
     for seed in range(50):
-        fuzz.read_all(
-            write(tmp_path, name, fuzz.broken_file(name, data, np.random.default_rng(seed)))
-        )
-    assert fuzz.read_all(write(tmp_path, name, data))
+        broken = fuzz.broken_file(name, data, np.random.default_rng(seed))
+        fuzz.read_all(name, write(tmp_path, name, broken))
+    assert fuzz.read_all(name, write(tmp_path, name, data))
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_no_arithmetic_holds_are_dropped_without_warnings(tmp_path: Path):
+    signalling = np.full(3, 0x7FA00000, "<u4").tobytes()
+    data = pcd_head("x y z", "4 4 4", "F F F", "binary") + surface().astype("<f4").tobytes()
+    scan = read_scan(write(tmp_path, "a.pcd", data[:-12] + signalling))
+    assert scan.num_dropped == len(HOLES) + 1
+    lines = SAMPLES["two.ptx"]().replace(b"1 0 0 0", b"1e300 1e300 0 0", 1)
+    assert "no rigid motion" in read_scan(write(tmp_path, "a.ptx", lines)).notes[0]
+
+
+def test_wrong_sizes_of_packed_pieces_end_nothing(tmp_path: Path, capfd: pytest.CaptureFixture):
+    """What reads LAZ in parallel believes them, reserves the memory, and ends the process."""
+    pytest.importorskip("lazrs")
+    data = WITH_LIBRARIES["points.laz"][1]()
+    start = int.from_bytes(data[96:100], "little")
+    table = int.from_bytes(data[start : start + 8], "little") + 8
+    lying = data[:table] + b"\xff" * (len(data) - table)
+    assert len(read_scan(write(tmp_path, "a.laz", lying)).points) == ROWS * COLUMNS
+    head = data.index(b"laszip encoded") + 52
+    unchunked = data[:head] + b"\1\0" + data[head + 2 :]
+    with pytest.raises(ReadError, match="without chunks, as LASzip 1 did; unpack it to LAS"):
+        read_scan(write(tmp_path, "a.laz", unchunked))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_arrays_with_named_fields(tmp_path: Path):
+    """As PDAL and pyntcloud save them."""
+    shades = colors().reshape(ROWS, COLUMNS, 3)
+    fields = [(name, "<f4") for name in ("Z", "Y", "X")] + [("GpsTime", "<f8")]
+    fields += [(name, "<u2") for name in ("Red", "Green", "Blue")]
+    records = np.zeros((ROWS, COLUMNS), fields)
+    for k, name in enumerate("XYZ"):
+        records[name] = surface()[..., k]
+    for k, name in enumerate(("Red", "Green", "Blue")):
+        records[name] = 257 * shades[..., k].astype(np.uint16)
+    scan = read_scan(write(tmp_path, "a.npy", npy(records)))
+    assert_is_surface(scan)
+    assert_has_colors(scan)
+    assert scan.notes[0] == "columns ignored: gpstime"
+    scan = read_scan(write(tmp_path, "a.npy", npy(records.ravel())))
+    np.testing.assert_array_equal(scan.points, surface()[SEEN])
+    for odd in (np.zeros(9, [("x", "<f4"), ("y", "<f4")]), records[None], records[:0]):
+        with pytest.raises(ReadError, match=r"records .* save x, y and z"):
+            read_scan(write(tmp_path, "a.npy", npy(odd)))
+
+
+def test_e57_numbers_may_be_scaled():
+    libe57 = pytest.importorskip("pye57.libe57")
+    from scanweld.io.scan_formats.e57 import number_of
+
+    with TemporaryDirectory() as folder:
+        image = libe57.ImageFile(f"{folder}/a.e57", "w")
+        assert number_of(libe57.ScaledIntegerNode(image, 50, 0, 255, 0.5, 3.0)) == 28
+        assert number_of(libe57.IntegerNode(image, 7, 0, 255)) == 7
+        image.cancel()

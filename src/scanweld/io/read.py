@@ -1,8 +1,14 @@
-"""One door for all formats: ``read_scan`` and ``read_mesh``."""
+"""One door for all formats: ``read_scan`` and ``read_mesh``.
+
+What overflows or is no number while bytes of any kind are read is not warned of, but dropped or
+refused, as all that is not finite.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
@@ -16,7 +22,10 @@ from scanweld.io.scan_formats.records import Keeps, Part
 from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
 from scanweld.io.unpack import gunzip
 
+_any_bits = np.errstate(over="ignore", invalid="ignore")
 
+
+@_any_bits
 def read_scan(path: Path | str, name: str | None = None, *, part: int = 0) -> RangeScan:
     """Read a file as one scan, in the coordinates and the unit of the file.
 
@@ -35,6 +44,7 @@ def read_scan(path: Path | str, name: str | None = None, *, part: int = 0) -> Ra
     return to_scan(path, stem_of(path) if name is None else name, parts[part].read())
 
 
+@_any_bits
 def read_mesh(path: Path | str) -> TriangleMesh:
     """Read a file as a triangle mesh; polygons become fans of triangles.
 
@@ -45,6 +55,7 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     return to_mesh(path, _parts(path)[0].read())
 
 
+@_any_bits
 def part_names(path: Path) -> tuple[str, ...]:
     """What a file calls its scans, empty where it does not; of one that is broken, one such name.
 
