@@ -178,7 +178,7 @@ TWO_CELLS = f"{GRID_OF_TWO}element range_grid 2\n{GRID}"
         (f"element vertex 1\n{XYZ}", "0 0 0\n1 1 1\n", "more than its header says"),
         (f"element vertex 2\n{XYZ}", "0 0 0\n", "ends too early"),
         (f"element vertex 2\n{XYZ}", "0 0 0\n1 oops 1\n", "line 9: 'oops' is not a number"),
-        (f"element vertex 1\n{XYZ}", "nan 0 0\n", "none that is finite"),
+        (f"element vertex 1\n{XYZ}", "nan 0 0\n", "not finite"),
         (f"element vertex 0\n{XYZ}", "", "holds no points"),
         (f"element point 1\n{XYZ}", "0 0 0\n", "no element 'vertex'"),
         ("element vertex 1\nproperty float x\n", "0\n", "lack x, y or z"),

@@ -319,6 +319,38 @@ def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_p
     assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.xyz", pcd_binary(), "is PCD by its content; call it .pcd"),
+        ("a.ply", gzip.compress(pcd_binary()), "is packed by gzip; add .gz to its name"),
+        ("a.ply.gz", gzip.compress(pcd_binary()), "is PCD by its content"),
+        ("a.e57", b"0 0 1\n1 0 1\n", "begins with numbers as text; call it .xyz"),
+        ("a.obj", b"<!DOCTYPE html><html>", "is a web page; download the file again"),
+        (
+            "a.las",
+            b"version https://git-lfs.github.com/spec/v1\n",
+            "is a pointer of Git LFS; fetch",
+        ),
+        ("a.stl", b"PK\3\4abc", "is a ZIP archive; unpack it"),
+        ("a.pcd", b"\x89PNG\r\n", "is a picture or a document; leave it out"),
+        (
+            "a.xyz",
+            b"7 7 7\n" * 60,
+            r"none that was seen \(60 points that are all \(7, 7, 7\) dropped",
+        ),
+    ],
+)
+def test_files_that_are_not_what_they_are_called_say_what_they_are(
+    name: str, data: bytes, says: str, tmp_path: Path
+):
+    if name.endswith("e57"):
+        pytest.importorskip("pye57")
+    with pytest.raises(ReadError, match=says) as caught:
+        read_scan(write(tmp_path, name, data))
+    assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
+
+
 def test_what_open3d_writes_as_pcd_is_read(tmp_path: Path):
     o3d = pytest.importorskip("open3d")
     rng = np.random.default_rng(4)

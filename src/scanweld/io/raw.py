@@ -69,7 +69,8 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
     seen, notes = seen_points(raw.points, raw.faces)
     dropped = int((~seen).sum())
     if dropped == len(seen):
-        raise ReadError(f"{path}: holds no points, or none that is finite; leave it out")
+        told = f" ({notes[0].partition(':')[0]})" if notes else ""
+        raise ReadError(f"{path}: holds no points, or none that was seen{told}; leave it out")
     points = raw.points[seen] if dropped else raw.points
     refuse_coarse(path, points, are_vertices=raw.faces is not None and len(raw.faces) > 0)
     notes = raw.notes + notes

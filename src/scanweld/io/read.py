@@ -15,6 +15,7 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.local_origin import SHIFT_KEY, told_shift
+from scanweld.io.misnamed import BEGIN, what_it_is
 from scanweld.io.names import is_gzipped, stem_of, suffix_of
 from scanweld.io.not_scans import why_unread
 from scanweld.io.raw import RawScan, to_mesh, to_scan
@@ -85,12 +86,23 @@ def _parts(path: Path) -> Sequence[Part]:
     if is_empty:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
     data = gunzip(path, data) if is_gzipped(path) else data
-    found = form.read(path, data)
+    try:
+        found = form.read(path, data)
+    except ReadError as error:
+        if told := what_it_is(path, data[:BEGIN] or _first_bytes(path)):
+            raise ReadError(f"{path}: {told}") from error
+        raise
     parts = [Part(read=lambda: found)] if isinstance(found, RawScan) else found
     if not parts:
         raise ReadError(f"{path}: holds no scans; leave it out")
     shift = _told_shift(path, data)
     return parts if shift is None else [_moved(part, shift) for part in parts]
+
+
+def _first_bytes(path: Path) -> bytes:
+    """Those of a file that its reader opens itself."""
+    with path.open("rb") as stream:
+        return stream.read(BEGIN)
 
 
 def _told_shift(path: Path, data: bytes) -> FloatArray | None:

@@ -64,7 +64,7 @@ def _asked(path: Path, question: Callable[[], Answer]) -> Answer:
     except ReadError:
         raise
     except Exception as error:
-        told = " ".join(str(error).split())[:100]
+        told = " ".join(str(error).partition("*")[0].split())[:100]
         raise ReadError(
             f"{path}: not an E57 file, or a broken one ({told}); copy it again or export it anew"
         ) from error
@@ -221,4 +221,5 @@ FORMAT = ScanFormat(
     keeps=(Keeps.SCANS, Keeps.GRID, Keeps.SENSOR, Keeps.POSE, Keeps.NORMALS, Keeps.COLORS),
     extra="e57",
     opens_path=True,
+    begins=(b"ASTM-E57",),
 )

@@ -119,4 +119,10 @@ def _shades(values: np.ndarray) -> ByteArray | None:
     return to_bytes(values, "u2") if len(values) and values.min() < values.max() else None
 
 
-FORMAT = ScanFormat(suffixes=(".las", ".laz"), read=read_las, keeps=(Keeps.COLORS,), extra="las")
+FORMAT = ScanFormat(
+    suffixes=(".las", ".laz"),
+    read=read_las,
+    keeps=(Keeps.COLORS,),
+    extra="las",
+    begins=(b"LASF",),
+)

@@ -78,5 +78,8 @@ def _off_faces(path: Path, rows: list[tuple[int, list[bytes]]]) -> IntArray | No
 
 
 FORMAT = ScanFormat(
-    suffixes=(".off",), read=read_off, keeps=(Keeps.FACES, Keeps.NORMALS, Keeps.COLORS)
+    suffixes=(".off",),
+    read=read_off,
+    keeps=(Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
+    begins=(b"OFF", b"COFF", b"NOFF", b"CNOFF"),
 )

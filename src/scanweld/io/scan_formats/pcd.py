@@ -193,5 +193,6 @@ def _viewpoint(header: PcdHeader, points: FloatArray) -> tuple[Pose | None, tupl
 FORMAT = ScanFormat(
     suffixes=(".pcd",),
     read=read_pcd,
+    begins=(b"# .PCD",),
     keeps=(Keeps.GRID, Keeps.SENSOR, Keeps.NORMALS, Keeps.COLORS),
 )

@@ -233,5 +233,6 @@ def _sensor_pose(header: PlyHeader) -> Pose | None:
 FORMAT = ScanFormat(
     suffixes=(".ply",),
     read=read_ply,
+    begins=(b"ply\n", b"ply\r"),
     keeps=(Keeps.GRID, Keeps.SENSOR, Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
 )

@@ -97,4 +97,4 @@ def _first_alike(
     return first[:count], index
 
 
-FORMAT = ScanFormat(suffixes=(".stl",), read=read_stl, keeps=(Keeps.FACES,))
+FORMAT = ScanFormat(suffixes=(".stl",), read=read_stl, keeps=(Keeps.FACES,), begins=(b"solid ",))
