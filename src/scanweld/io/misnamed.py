@@ -27,13 +27,13 @@ def what_it_is(path: Path, begin: bytes) -> str:
     own = format_of(path)
     if own is not None and begin.startswith(own.begins):
         return ""
-    for suffix, form in formats_by_suffix().items():
-        if form is not own and begin.startswith(form.begins):
-            return f"is {suffix[1:].upper()} by its content; call it {suffix}"
     for begins, what, remedy in _OTHERS:
         if begin.lstrip().lower().startswith(begins):
             return f"{what}; {remedy}"
+    for suffix, form in formats_by_suffix().items():
+        if form is not own and begin.startswith(form.begins):
+            return f"is {suffix[1:].upper()} by its content; call it {suffix}"
     words = begin.partition(b"\n")[0].split()
-    if len(words) >= 3 and all(map(is_number, words)):
+    if len(words) >= 3 and all(map(is_number, words)) and own is not formats_by_suffix()[".xyz"]:
         return "begins with numbers as text; call it .xyz"
     return ""

@@ -89,7 +89,8 @@ def _parts(path: Path) -> Sequence[Part]:
     try:
         found = form.read(path, data)
     except ReadError as error:
-        if told := what_it_is(path, data[:BEGIN] or _first_bytes(path)):
+        begin = _first_bytes(path) if form.opens_path else data[:BEGIN]
+        if told := what_it_is(path, begin):
             raise ReadError(f"{path}: {told}") from error
         raise
     parts = [Part(read=lambda: found)] if isinstance(found, RawScan) else found

@@ -172,5 +172,5 @@ FORMAT = ScanFormat(
     read=read_numpy,
     keeps=(Keeps.GRID, Keeps.NORMALS, Keeps.COLORS),
     only_named=(".npy", ".npz"),
-    begins=(_MAGIC,),
+    begins=(_MAGIC, b"PK"),
 )
