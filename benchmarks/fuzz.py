@@ -114,11 +114,12 @@ def fuzz(name: str, count: int, seed: int) -> Json:
                 slowest = max(slowest, time.process_time() - begin)
     return {
         **{"name": name, "files": count, "read": num_read, "wrong": wrong},
-        **{"seconds": slowest, "megabytes": _peak_megabytes()},
+        **{"seconds": slowest, "megabytes": peak_megabytes()},
     }
 
 
-def _peak_megabytes() -> float:
+def peak_megabytes() -> float:
+    """The most memory that this process has had at a time."""
     import resource
 
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -2,15 +2,15 @@
 
     python -m benchmarks.pages
 
-``make benchmarks`` measures first, ``python -m benchmarks.fuzz`` what is of files. What a part says
-comes from the JSON alone, so that no figure is typed by hand.
+``make benchmarks`` measures first, ``python -m benchmarks.fuzz`` and ``benchmarks.reading`` what is
+of files. What a part says comes from the JSON alone, so that no figure is typed by hand.
 """
 
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks import blocks, fuzz, keypoints, model, pairs, run
+from benchmarks import blocks, fuzz, keypoints, model, pairs, reading, run
 from benchmarks.results import DATA, DOCS, ROOT, Json, how_measured, read_results, write_file
 from scanweld.io.scan_formats.registry import formats_markdown
 
@@ -24,6 +24,7 @@ BLOCKS: dict[str, tuple[str, Callable[[Sequence[Json]], Json]]] = {
     "keypoints": ("keypoints", keypoints.over_views),
     **dict.fromkeys(("model", "model-rivals", "model-many"), ("model", model.by_kind)),
     "fuzz": ("fuzz", fuzz.by_format),
+    "reading": ("reading", reading.over_files),
 }
 """Part of a page, and its template -> its results in docs/data, and what sums these up for it."""
 

@@ -38,12 +38,20 @@ def colors() -> ByteArray:
     return (np.arange(3 * ROWS * COLUMNS).reshape(-1, 3) * 2 % 256).astype(np.uint8)
 
 
-def pcd_head(fields: str, sizes: str, types: str, data: str, counts: str = "") -> bytes:
-    """The header of a PCD file of the surface."""
+def pcd_head(
+    fields: str,
+    sizes: str,
+    types: str,
+    data: str,
+    counts: str = "",
+    shape: tuple[int, int] = (ROWS, COLUMNS),
+) -> bytes:
+    """The header of a PCD file of so many rows and columns, those of the surface if not given."""
     counts = counts or " ".join("1" for _ in fields.split())
+    rows, columns = shape
     return (
         f"# .PCD v0.7\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n"
-        f"WIDTH {COLUMNS}\nHEIGHT {ROWS}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {ROWS * COLUMNS}\n"
+        f"WIDTH {columns}\nHEIGHT {rows}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {rows * columns}\n"
         f"DATA {data}\n"
     ).encode()
 

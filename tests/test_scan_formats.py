@@ -10,8 +10,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-import trimesh
-import trimesh.visual
 
 from benchmarks import fuzz
 from benchmarks.sample_files import (
@@ -349,57 +347,6 @@ def test_files_that_are_not_what_they_are_called_say_what_they_are(
     with pytest.raises(ReadError, match=says) as caught:
         read_scan(write(tmp_path, name, data))
     assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
-
-
-def test_what_open3d_writes_as_pcd_is_read(tmp_path: Path):
-    o3d = pytest.importorskip("open3d")
-    rng = np.random.default_rng(4)
-    points, normals = rng.random((50, 3)), np.tile([0.6, 0, 0.8], (50, 1))
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.colors = o3d.utility.Vector3dVector(rng.integers(0, 256, (50, 3)) / 255)
-    cloud.normals = o3d.utility.Vector3dVector(normals)
-    path = tmp_path / "a.pcd"
-    for options in ({}, {"write_ascii": True}, {"compressed": True}):
-        o3d.io.write_point_cloud(str(path), cloud, **options)
-        scan = read_scan(path)
-        assert scan.normals is not None and scan.notes == ()
-        np.testing.assert_allclose(scan.points, points, atol=1e-7)
-        np.testing.assert_allclose(scan.normals, normals, atol=1e-7)
-        np.testing.assert_array_equal(scan.colors, np.rint(255 * np.asarray(cloud.colors)))
-
-
-def test_what_trimesh_writes_as_glb_is_read(tmp_path: Path):
-    rng, path = np.random.default_rng(4), tmp_path / "a.glb"
-    ball = trimesh.creation.icosphere(subdivisions=1)
-    shades = rng.integers(0, 256, (len(ball.vertices), 4)).astype(np.uint8)
-    ball.visual = trimesh.visual.ColorVisuals(ball, vertex_colors=shades)
-    cloud, turn = rng.random((9, 3)), trimesh.transformations.rotation_matrix(1, [1, 2, 3])
-    scene = trimesh.Scene()
-    scene.add_geometry(ball, transform=turn)
-    scene.add_geometry(trimesh.PointCloud(cloud), transform=turn.T)
-    scene.export(path)
-    scan = read_scan(path)
-    balls, clouds = (
-        trimesh.transform_points(p, t) for p, t in ((ball.vertices, turn), (cloud, turn.T))
-    )
-    np.testing.assert_allclose(np.sort(scan.points, 0), np.sort([*balls, *clouds], 0), atol=1e-6)
-    assert "colours on some of its meshes only" in scan.notes[0]
-    ball.export(path)
-    np.testing.assert_array_equal(read_scan(path).colors, shades[:, :3])
-
-
-@pytest.mark.parametrize("form", ["vtk42", "vtk51"])
-@pytest.mark.parametrize("is_binary", [True, False])
-def test_what_meshio_writes_as_vtk_is_read(form: str, is_binary: bool, tmp_path: Path):
-    meshio = pytest.importorskip("meshio")
-    rng, path = np.random.default_rng(4), tmp_path / "a.vtk"
-    points, faces = rng.random((50, 3)), rng.integers(0, 50, (30, 3))
-    data = {"a": rng.random(50), "v": rng.random((50, 3))}
-    mesh = meshio.Mesh(points, [("triangle", faces)], point_data=data)
-    meshio.write(path, mesh, file_format=form, binary=is_binary)
-    scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, points)
-    np.testing.assert_array_equal(scan.faces, faces)
 
 
 @pytest.mark.filterwarnings("error")
