@@ -110,6 +110,7 @@ def test_ply_of_trimesh_and_ours_there(encoding: str, tmp_path: Path):
     assert isinstance(theirs, trimesh.Trimesh)
     np.testing.assert_array_equal(theirs.vertices, POINTS)
     np.testing.assert_array_equal(theirs.faces, FACES)
+    assert isinstance(theirs.visual, trimesh.visual.ColorVisuals)
     np.testing.assert_array_equal(theirs.visual.vertex_colors[:, :3], COLORS)
 
 

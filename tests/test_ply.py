@@ -109,6 +109,9 @@ def test_what_was_read_otherwise_or_left_out_is_noted(tmp_path: Path) -> None:
     assert scan.colors is not None
     np.testing.assert_array_equal(scan.colors, [[51, 51, 51], [255, 255, 255]])
     assert scan.notes == ("intensity read as grey",)
+    header = f"element vertex 1\n{XYZ}property uchar alpha\nproperty float scalar_Time\n"
+    scan = read_scan(ascii_ply(tmp_path / "a.ply", header, "0 0 0 255 7\n"))
+    assert scan.notes == ("properties ignored: scalar_time",)
     header = f"element vertex 1\n{XYZ}element range_grid 1\n{GRID}"
     scan = read_scan(ascii_ply(tmp_path / "a.ply", header, "0 0 0\n1 0\n"))
     assert scan.grid is None

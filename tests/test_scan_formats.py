@@ -28,6 +28,7 @@ from benchmarks.sample_files import (
     surface,
     vtk,
 )
+from benchmarks.sample_texts import SCANS
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io import collect, read_scan
@@ -257,6 +258,29 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: 
         monkeypatch.setitem(sys.modules, library, None)
         with pytest.raises(ReadError, match=rf"pip install 'scanweld\[{extra}"):
             read_scan(write(tmp_path, name, b"anything"))
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "what"),
+    [
+        ("a.pcd", pcd_of("x y z intensity", "0 0 1 -9", "1 0 1 900"), "intensities"),
+        ("a.pcd", pcd_of("x y z r g b", "0 0 1 0 0 -1", "1 0 1 1 1 1"), "colours"),
+        ("a.obj", b"v 0 0 1 0 0 900\nv 1 0 1 1 1 1\n", "colours"),
+        ("a.off", b"COFF 2 0 0\n0 0 1 0 0 -1 1\n1 0 1 0 0 0 1\n", "colours"),
+        ("a.ptx", SAMPLES["two.ptx"]().replace(b" 0.5", b" -2047"), "intensities"),
+        (
+            "a.ply",
+            SCANS["mesh.ply"].replace("uchar", "int", 1).replace("0 4\n", "0 -4\n").encode(),
+            "i",
+        ),
+    ],
+)
+def test_shades_on_no_known_scale_are_left_out_with_a_note(
+    name: str, data: bytes, what: str, tmp_path: Path
+):
+    scan = read_scan(write(tmp_path, name, data))
+    assert scan.colors is None
+    assert any(re.match(rf"{what}.* ignored: on no known scale", note) for note in scan.notes)
 
 
 def test_bombs_are_refused(tmp_path: Path):

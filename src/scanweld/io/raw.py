@@ -183,6 +183,16 @@ def to_bytes(values: NDArray, type_code: str = "") -> ByteArray | None:
     return np.rint(np.minimum(scaled, 255.0)).astype(np.uint8)
 
 
+def noted_bytes(
+    what: str, values: NDArray | None, type_code: str = ""
+) -> tuple[ByteArray | None, tuple[str, ...]]:
+    """What ``to_bytes`` makes of colours or intensities, and a note where it leaves them out."""
+    found = None if values is None else to_bytes(values, type_code)
+    if values is None or found is not None:
+        return found, ()
+    return None, (f"{what} ignored: on no known scale (0 to 1, 0 to 255)",)
+
+
 def _check_indices(path: Path, raw: RawScan) -> None:
     """Make sure that all indices name points."""
     for what, indices, lowest in (("range grid cells", raw.grid, -1), ("faces", raw.faces, 0)):

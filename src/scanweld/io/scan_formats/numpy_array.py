@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray
-from scanweld.io.raw import RawScan, full_grid, side_by_side, to_bytes
+from scanweld.io.raw import RawScan, full_grid, noted_bytes, side_by_side
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text_columns import columns_by_name, scan_of_columns
 from scanweld.io.text_head import column_names
@@ -77,12 +77,13 @@ def _raw_scan(path: Path, found: dict[str, NDArray], notes: tuple[str, ...]) -> 
                 f"{path}: its {key} have the shape {array.shape}, its points {shape}; make them fit"
             )
     normals = found.get("normals")
+    colors, no_colors = _colors(found.get("colors"))
     return RawScan(
         points=_rows(found["points"]),
         grid=full_grid(*shape[:2]) if len(shape) == 3 else None,
         normals=None if normals is None else _rows(normals),
-        colors=_colors(found.get("colors")),
-        notes=notes,
+        colors=colors,
+        notes=(*notes, *no_colors),
     )
 
 
@@ -105,10 +106,11 @@ def _rows(array: NDArray) -> FloatArray:
     return np.ascontiguousarray(array.reshape(-1, array.shape[-1]), dtype=np.float64)
 
 
-def _colors(array: NDArray | None) -> ByteArray | None:
+def _colors(array: NDArray | None) -> tuple[ByteArray | None, tuple[str, ...]]:
     if array is None:
-        return None
-    return to_bytes(array.reshape(-1, array.shape[-1])[:, :3], array.dtype.str[1:])
+        return None, ()
+    rows = array.reshape(-1, array.shape[-1])[:, :3]
+    return noted_bytes("colours", rows, array.dtype.str[1:])
 
 
 def _unzipped(path: Path, data: bytes) -> dict[str, NDArray]:

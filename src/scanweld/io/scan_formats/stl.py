@@ -58,7 +58,8 @@ def _merged(corners: NDArray[np.floating]) -> tuple[FloatArray, IntArray]:
     corners = corners + corners.dtype.type(0)  # no minus zero
     table = np.full(1 << (4 * len(corners) // 3 + 1).bit_length(), -1, dtype=np.int32)
     words = corners.view(np.uint32)
-    first, index = _first_alike(words, np.isnan(corners).any(axis=1), table)
+    is_nan = np.asarray(np.isnan(corners).any(axis=1))
+    first, index = _first_alike(words, is_nan, table)
     return corners[first].astype(np.float64), index
 
 
