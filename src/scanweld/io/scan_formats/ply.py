@@ -27,23 +27,8 @@ _COLORS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
 )
-_KNOWN = frozenset(
-    [
-        "x",
-        "y",
-        "z",
-        "nx",
-        "ny",
-        "nz",
-        "intensity",
-        "confidence",
-        "support",
-        "stdev",
-        "filled",
-        "scan",
-        "alpha",
-    ]
-).union(*_COLORS)
+_OF_MODELS = ("confidence", "support", "stdev", "filled", "scan")
+_KNOWN = {*"xyz", "nx", "ny", "nz", "intensity", "alpha", *_OF_MODELS}.union(*_COLORS)
 """Properties of a vertex that are read, or need no word."""
 _LARGEST_INDEX = 2**53
 """Above this a double, as which the numbers of ASCII files are read, is not exact."""
