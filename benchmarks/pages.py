@@ -1,25 +1,30 @@
-"""Write the measured parts of README.md, docs/benchmarks.md and docs/model.md anew, from docs/data.
+"""Write the measured parts of README.md and some pages of docs anew, from docs/data.
 
     python -m benchmarks.pages
 
-``make benchmarks`` measures first. What a part says comes from the JSON alone, so that no figure is
-typed by hand.
+``make benchmarks`` measures first, ``python -m benchmarks.fuzz`` and ``benchmarks.reading`` what is
+of files. What a part says comes from the JSON alone, so that no figure is typed by hand.
 """
 
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks import blocks, keypoints, model, pairs, run
+from benchmarks import blocks, fuzz, keypoints, model, pairs, reading, run
 from benchmarks.results import DATA, DOCS, ROOT, Json, how_measured, read_results, write_file
+from scanweld.io.scan_formats.registry import formats_markdown
 
-PAGES = (ROOT / "README.md", DOCS / "benchmarks.md", DOCS / "model.md")
+PAGES = (ROOT / "README.md", *(DOCS / f"{name}.md" for name in ("benchmarks", "model", "formats")))
 USAGE_ERROR = 2
+TABLE_OF_FORMATS = "scan-formats"
+"""The one part that is not measured."""
 BLOCKS: dict[str, tuple[str, Callable[[Sequence[Json]], Json]]] = {
     **dict.fromkeys(("sets", "sets-in-words"), ("sets", run.over_seeds)),
     **dict.fromkeys(("pairs", "pairs-in-words"), ("pairs", pairs.over_pairs)),
     "keypoints": ("keypoints", keypoints.over_views),
     **dict.fromkeys(("model", "model-rivals", "model-many"), ("model", model.by_kind)),
+    "fuzz": ("fuzz", fuzz.by_format),
+    "reading": ("reading", reading.over_files),
 }
 """Part of a page, and its template -> its results in docs/data, and what sums these up for it."""
 
@@ -47,6 +52,8 @@ def rewritten(text: str, data: Path = DATA) -> str:
 
 def block(name: str, data: Path = DATA) -> str:
     """A measured part of a page, by its name."""
+    if name == TABLE_OF_FORMATS:
+        return formats_markdown()
     source, summed_up = BLOCKS[name]
     document = read_results(data / f"{source}.json")
     part = blocks.rendered(name, **summed_up(document["records"]))

@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.sample_texts import SCANS
 from scanweld.geometry.arrays import ByteArray, FloatArray
 
 ROWS, COLUMNS = 6, 7
@@ -37,12 +38,20 @@ def colors() -> ByteArray:
     return (np.arange(3 * ROWS * COLUMNS).reshape(-1, 3) * 2 % 256).astype(np.uint8)
 
 
-def pcd_head(fields: str, sizes: str, types: str, data: str, counts: str = "") -> bytes:
-    """The header of a PCD file of the surface."""
+def pcd_head(
+    fields: str,
+    sizes: str,
+    types: str,
+    data: str,
+    counts: str = "",
+    shape: tuple[int, int] = (ROWS, COLUMNS),
+) -> bytes:
+    """The header of a PCD file of so many rows and columns, those of the surface if not given."""
     counts = counts or " ".join("1" for _ in fields.split())
+    rows, columns = shape
     return (
         f"# .PCD v0.7\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n"
-        f"WIDTH {COLUMNS}\nHEIGHT {ROWS}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {ROWS * COLUMNS}\n"
+        f"WIDTH {columns}\nHEIGHT {rows}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {rows * columns}\n"
         f"DATA {data}\n"
     ).encode()
 
@@ -132,6 +141,42 @@ def npy(array: NDArray) -> bytes:
     """An array as NumPy saves it."""
     stream = BytesIO()
     np.save(stream, array)
+    return stream.getvalue()
+
+
+def stl() -> bytes:
+    """Two triangles, binary."""
+    facets = np.zeros(2, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("-", "<u2")]))
+    facets["corners"] = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 1], [0, 1, 0]]]
+    return bytes(80) + struct.pack("<I", 2) + facets.tobytes()
+
+
+def ply_big_endian() -> bytes:
+    """A mesh of doubles with colours and lists of faces."""
+    points, shades = np.nan_to_num(surface()).reshape(-1, 3), colors()
+    head = f"ply\nformat binary_big_endian 1.0\nelement vertex {len(points)}\n"
+    head += "".join(f"property double {axis}\n" for axis in "xyz")
+    head += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    head += "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    table = np.zeros(len(points), np.dtype([("p", ">f8", 3), ("c", "u1", 3)]))
+    table["p"], table["c"] = points, shades
+    return head.encode() + table.tobytes() + struct.pack(">B3iB4i", 3, 0, 1, 8, 4, 1, 2, 9, 8)
+
+
+def depth_image(kind: str, *, is_float: bool = False) -> bytes:
+    """A depth image, in whole millimetres or in metres, as Pillow saves it."""
+    image = import_module("PIL.Image")
+    depth = np.nan_to_num(surface()[..., 2])
+    values = depth.astype(np.float32) if is_float else np.rint(1000 * depth).astype(np.uint16)
+    stream = BytesIO()
+    image.fromarray(values).save(stream, kind)
+    return stream.getvalue()
+
+
+def depth_npz() -> bytes:
+    """Depths in millimetres, as NumPy saves them."""
+    stream = BytesIO()
+    np.savez_compressed(stream, depth=np.rint(1000 * np.nan_to_num(surface()[..., 2])))
     return stream.getvalue()
 
 
@@ -238,14 +283,26 @@ SAMPLES: dict[str, Callable[[], bytes]] = {
     "compressed.pcd": pcd_compressed,
     "two.ptx": ptx,
     "organised.ply": ply_organised,
+    "big_endian.ply": ply_big_endian,
+    "binary.stl": stl,
     "packed.pcd.gz": lambda: gzip.compress(pcd_binary(), mtime=0),
     "grid.npy": lambda: npy(surface()),
     "grid.npz": npz,
     "ascii.vtk": lambda: vtk(is_binary=False),
     "binary.vtk": lambda: vtk(is_binary=True),
     "nodes.glb": glb,
+    "utf16.txt": lambda: SCANS["plain.xyz"].encode("utf-16"),
+    "packed.xyz.gz": lambda: gzip.compress(SCANS["plain.xyz"].encode(), mtime=0),
 }
 """Makers of the files by their names,"""
+DEPTH_IMAGES: dict[str, Callable[[], bytes]] = {
+    "a.png": lambda: depth_image("PNG"),
+    "a.tif": lambda: depth_image("TIFF"),
+    "float.tif": lambda: depth_image("TIFF", is_float=True),
+    "a.npy": lambda: npy(np.nan_to_num(surface()[..., 2])),
+    "a.npz": depth_npz,
+}
+"""those of depth images,"""
 WITH_LIBRARIES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "two.e57": ("pye57", e57),
     "points.las": ("laspy", lambda: las(is_packed=False)),

@@ -83,6 +83,9 @@ def test_what_is_missing_or_of_an_unknown_format_is_an_error(folder: Path):
         collect([folder / "poses.json"])
     with pytest.raises(InputError, match="no scans given"):
         collect([])
+    (folder / "loop.obj").symlink_to("loop.obj")
+    with pytest.raises(ReadError, match=r"loop\.obj: is a link that leads nowhere"):
+        collect([folder / "loop.obj"])
     for what in ("folder.ply", "*.las", "none*.ply"):
         with pytest.raises(InputError, match="holds no scans"):
             collect([os.path.join(folder, what)])

@@ -149,6 +149,7 @@ def test_lens_and_scale_come_with_the_intrinsics(tmp_path: Path):
     [
         ("", "no numbers in it"),
         ("1 2 3", "3 numbers, not 4"),
+        ("90 91 39 28 1e999 60", "infinity"),
         ("525 525 319 239 640 480 0", "7 numbers"),
         (f"80 60 {TEXT}", "width and height are no whole numbers"),
         ("fx=525 fy=525", "no cx cy"),

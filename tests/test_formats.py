@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as nps
@@ -44,16 +43,6 @@ def test_obj_and_off_are_read_exactly(vertices: np.ndarray, faces: np.ndarray, t
         mesh = read_mesh(put(tmp_path / name, text))
         np.testing.assert_array_equal(mesh.vertices, vertices)
         np.testing.assert_array_equal(mesh.faces, faces)
-
-
-@pytest.mark.parametrize("suffix", ["obj", "off", "stl", "ply"])
-def test_what_another_program_writes_is_read(suffix: str, tmp_path: Path):
-    path = tmp_path / f"ball.{suffix}"
-    ball = trimesh.creation.icosphere(subdivisions=2, radius=3.0)
-    ball.export(path)
-    mesh = read_mesh(path)
-    assert len(mesh.vertices) == len(ball.vertices)
-    np.testing.assert_allclose(mesh.vertices[mesh.faces], ball.triangles, atol=1e-6)
 
 
 def test_obj_corners_of_all_kinds_and_none(tmp_path: Path):

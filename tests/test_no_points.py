@@ -74,6 +74,7 @@ def test_what_was_measured_stays():
     coarse = RNG.integers(-9, 9, (20_000, 3)).astype(float)
     coarse[(coarse == 0).all(axis=1)] = 1.0
     few = np.concatenate([np.zeros((9, 3)), RNG.normal(size=(300, 3))])
-    for points, faces in ((cone, soup), (plates, None), (coarse, None), (few, None)):
+    wall = RNG.normal(size=(300, 3)) * [1, 0, 1] + [0, 65535, 0]
+    for points, faces in ((cone, soup), (plates, None), (coarse, None), (few, None), (wall, None)):
         scan = read(points, faces)
         assert scan.num_dropped == 0 and scan.notes == () and scan.grid is None

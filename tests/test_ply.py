@@ -109,6 +109,9 @@ def test_what_was_read_otherwise_or_left_out_is_noted(tmp_path: Path) -> None:
     assert scan.colors is not None
     np.testing.assert_array_equal(scan.colors, [[51, 51, 51], [255, 255, 255]])
     assert scan.notes == ("intensity read as grey",)
+    header = f"element vertex 1\n{XYZ}property uchar alpha\nproperty float scalar_Time\n"
+    scan = read_scan(ascii_ply(tmp_path / "a.ply", header, "0 0 0 255 7\n"))
+    assert scan.notes == ("properties ignored: scalar_time",)
     header = f"element vertex 1\n{XYZ}element range_grid 1\n{GRID}"
     scan = read_scan(ascii_ply(tmp_path / "a.ply", header, "0 0 0\n1 0\n"))
     assert scan.grid is None
@@ -178,7 +181,7 @@ TWO_CELLS = f"{GRID_OF_TWO}element range_grid 2\n{GRID}"
         (f"element vertex 1\n{XYZ}", "0 0 0\n1 1 1\n", "more than its header says"),
         (f"element vertex 2\n{XYZ}", "0 0 0\n", "ends too early"),
         (f"element vertex 2\n{XYZ}", "0 0 0\n1 oops 1\n", "line 9: 'oops' is not a number"),
-        (f"element vertex 1\n{XYZ}", "nan 0 0\n", "none that is finite"),
+        (f"element vertex 1\n{XYZ}", "nan 0 0\n", "not finite"),
         (f"element vertex 0\n{XYZ}", "", "holds no points"),
         (f"element point 1\n{XYZ}", "0 0 0\n", "no element 'vertex'"),
         ("element vertex 1\nproperty float x\n", "0\n", "lack x, y or z"),

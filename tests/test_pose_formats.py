@@ -17,6 +17,7 @@ from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.io import PoseSet, read_poses, write_poses
 from scanweld.io.pose_formats import FORMATS, Frame, PosedScan, match_poses, read_any_poses
 from tests.data import require_data
+from tests.libraries import open3d
 
 CAMERA = Camera(model=CameraModel.PINHOLE, width=40, height=30, fx=50, fy=60, cx=19.5, cy=14.25)
 QUARTER = Pose(
@@ -218,7 +219,7 @@ def test_real_conf_gives_the_published_poses():
 
 
 def test_open3d_reads_and_writes_the_same_pose_graph(tmp_path: Path):
-    o3d = pytest.importorskip("open3d", exc_type=ImportError)
+    o3d = open3d()
     scans = [scan_at(f"s{k}", random_pose(k, 3.0)) for k in range(3)]
     path = write(tmp_path, "open3d", scans)
     graph = o3d.io.read_pose_graph(str(path))
@@ -303,6 +304,8 @@ BROKEN = {
     ),
     "none.mlp": "<MeshLabProject><MeshGroup/></MeshLabProject>",
     "cut.aln": "2\na.ply\n#\n" + ROWS,
+    "long.aln": "9" * 5000 + "\na.ply\n#\n" + ROWS,
+    "huge.aln": "1\na.ply\n#\n" + ROWS.replace("-1", "-1e300"),
     "scaled.aln": "1\na.ply\n#\n2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n0\n",
     "mirror.aln": "1\na.ply\n#\n-1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n0\n",
     "words.conf": "bmesh a.ply 1 2 3 0 0 1\n",

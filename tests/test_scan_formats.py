@@ -6,11 +6,10 @@ import sys
 import zipfile
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-import trimesh
-import trimesh.visual
 
 from benchmarks import fuzz
 from benchmarks.sample_files import (
@@ -29,6 +28,7 @@ from benchmarks.sample_files import (
     surface,
     vtk,
 )
+from benchmarks.sample_texts import SCANS
 from scanweld.errors import ReadError
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from scanweld.io import collect, read_scan
@@ -260,6 +260,29 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: 
             read_scan(write(tmp_path, name, b"anything"))
 
 
+@pytest.mark.parametrize(
+    ("name", "data", "what"),
+    [
+        ("a.pcd", pcd_of("x y z intensity", "0 0 1 -9", "1 0 1 900"), "intensities"),
+        ("a.pcd", pcd_of("x y z r g b", "0 0 1 0 0 -1", "1 0 1 1 1 1"), "colours"),
+        ("a.obj", b"v 0 0 1 0 0 900\nv 1 0 1 1 1 1\n", "colours"),
+        ("a.off", b"COFF 2 0 0\n0 0 1 0 0 -1 1\n1 0 1 0 0 0 1\n", "colours"),
+        ("a.ptx", SAMPLES["two.ptx"]().replace(b" 0.5", b" -2047"), "intensities"),
+        (
+            "a.ply",
+            SCANS["mesh.ply"].replace("uchar", "int", 1).replace("0 4\n", "0 -4\n").encode(),
+            "i",
+        ),
+    ],
+)
+def test_shades_on_no_known_scale_are_left_out_with_a_note(
+    name: str, data: bytes, what: str, tmp_path: Path
+):
+    scan = read_scan(write(tmp_path, name, data))
+    assert scan.colors is None
+    assert any(re.match(rf"{what}.* ignored: on no known scale", note) for note in scan.notes)
+
+
 def test_bombs_are_refused(tmp_path: Path):
     bomb = gzip.compress(bytes(SMALL + 1))
     with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
@@ -291,6 +314,9 @@ def test_bombs_are_refused(tmp_path: Path):
         ("a.pcd", pcd_binary().replace(b"WIDTH 7", b"WIDTH 0"), "WIDTH x HEIGHT"),
         ("a.xyz.gz", gzip.compress(b"0 0 0\n")[:-3], "cannot be unpacked"),
         ("a.gz", gzip.compress(b"0 0 0\n"), "unknown format"),
+        ("a.xyz.gz", gzip.compress(b""), "holds no points"),
+        ("a.obj", b"v 0 0 0\nf 1 1 " + b"9" * 30, "line 2: .* is broken"),
+        ("a.ply", SAMPLES["organised.ply"]().replace(b"end_h", b"element vertex 0\nend_h"), "two"),
         ("a.npy", npy(surface())[:-1], "truncated"),
         ("a.npy", npy(np.zeros((4, 5))), r"shape \(4, 5\)"),
         ("a.npy", npy(np.array([{}])), "save the points as numbers"),
@@ -315,63 +341,101 @@ def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_p
     assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
 
 
-def test_what_open3d_writes_as_pcd_is_read(tmp_path: Path):
-    o3d = pytest.importorskip("open3d")
-    rng = np.random.default_rng(4)
-    points, normals = rng.random((50, 3)), np.tile([0.6, 0, 0.8], (50, 1))
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.colors = o3d.utility.Vector3dVector(rng.integers(0, 256, (50, 3)) / 255)
-    cloud.normals = o3d.utility.Vector3dVector(normals)
-    path = tmp_path / "a.pcd"
-    for options in ({}, {"write_ascii": True}, {"compressed": True}):
-        o3d.io.write_point_cloud(str(path), cloud, **options)
-        scan = read_scan(path)
-        assert scan.normals is not None and scan.notes == ()
-        np.testing.assert_allclose(scan.points, points, atol=1e-7)
-        np.testing.assert_allclose(scan.normals, normals, atol=1e-7)
-        np.testing.assert_array_equal(scan.colors, np.rint(255 * np.asarray(cloud.colors)))
-
-
-def test_what_trimesh_writes_as_glb_is_read(tmp_path: Path):
-    rng, path = np.random.default_rng(4), tmp_path / "a.glb"
-    ball = trimesh.creation.icosphere(subdivisions=1)
-    shades = rng.integers(0, 256, (len(ball.vertices), 4)).astype(np.uint8)
-    ball.visual = trimesh.visual.ColorVisuals(ball, vertex_colors=shades)
-    cloud, turn = rng.random((9, 3)), trimesh.transformations.rotation_matrix(1, [1, 2, 3])
-    scene = trimesh.Scene()
-    scene.add_geometry(ball, transform=turn)
-    scene.add_geometry(trimesh.PointCloud(cloud), transform=turn.T)
-    scene.export(path)
-    scan = read_scan(path)
-    balls, clouds = (
-        trimesh.transform_points(p, t) for p, t in ((ball.vertices, turn), (cloud, turn.T))
-    )
-    np.testing.assert_allclose(np.sort(scan.points, 0), np.sort([*balls, *clouds], 0), atol=1e-6)
-    assert "colours on some of its meshes only" in scan.notes[0]
-    ball.export(path)
-    np.testing.assert_array_equal(read_scan(path).colors, shades[:, :3])
-
-
-@pytest.mark.parametrize("form", ["vtk42", "vtk51"])
-@pytest.mark.parametrize("is_binary", [True, False])
-def test_what_meshio_writes_as_vtk_is_read(form: str, is_binary: bool, tmp_path: Path):
-    meshio = pytest.importorskip("meshio")
-    rng, path = np.random.default_rng(4), tmp_path / "a.vtk"
-    points, faces = rng.random((50, 3)), rng.integers(0, 50, (30, 3))
-    data = {"a": rng.random(50), "v": rng.random((50, 3))}
-    mesh = meshio.Mesh(points, [("triangle", faces)], point_data=data)
-    meshio.write(path, mesh, file_format=form, binary=is_binary)
-    scan = read_scan(path)
-    np.testing.assert_array_equal(scan.points, points)
-    np.testing.assert_array_equal(scan.faces, faces)
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.xyz", pcd_binary(), "is PCD by its content; call it .pcd"),
+        ("a.ply", gzip.compress(pcd_binary()), "is packed by gzip; add .gz to its name"),
+        ("a.ply.gz", gzip.compress(pcd_binary()), "is PCD by its content"),
+        ("a.e57", b"0 0 1\n1 0 1\n", "begins with numbers as text; call it .xyz"),
+        ("a.obj", b"<!DOCTYPE html><html>", "is a web page; download the file again"),
+        (
+            "a.las",
+            b"version https://git-lfs.github.com/spec/v1\n",
+            "is a pointer of Git LFS; fetch",
+        ),
+        ("a.stl", b"PK\3\4abc", "is a ZIP archive; unpack it"),
+        ("a.pcd", b"\x89PNG\r\n", "is a picture or a document; leave it out"),
+        (
+            "a.xyz",
+            b"7 7 7\n" * 60,
+            r"none that was seen \(60 points that are all \(7, 7, 7\) dropped",
+        ),
+    ],
+)
+def test_files_that_are_not_what_they_are_called_say_what_they_are(
+    name: str, data: bytes, says: str, tmp_path: Path
+):
+    if name.endswith("e57"):
+        pytest.importorskip("pye57")
+    with pytest.raises(ReadError, match=says) as caught:
+        read_scan(write(tmp_path, name, data))
+    assert str(caught.value).startswith(f"{tmp_path / name}: ") and "\n" not in str(caught.value)
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", sorted(set(fuzz.samples()) - {"a.xyz"}))
+@pytest.mark.parametrize("name", fuzz.samples())
 def test_mutated_files_are_read_or_refused(name: str, tmp_path: Path):
     data = fuzz.samples()[name]()
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
     for seed in range(50):
-        fuzz.read_all(
-            write(tmp_path, name, fuzz.broken_file(name, data, np.random.default_rng(seed)))
-        )
-    assert fuzz.read_all(write(tmp_path, name, data))
+        broken = fuzz.broken_file(name, data, np.random.default_rng(seed))
+        fuzz.read_all(name, write(tmp_path, name, broken))
+    assert fuzz.read_all(name, write(tmp_path, name, data))
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_no_arithmetic_holds_are_dropped_without_warnings(tmp_path: Path):
+    signalling = np.full(3, 0x7FA00000, "<u4").tobytes()
+    data = pcd_head("x y z", "4 4 4", "F F F", "binary") + surface().astype("<f4").tobytes()
+    scan = read_scan(write(tmp_path, "a.pcd", data[:-12] + signalling))
+    assert scan.num_dropped == len(HOLES) + 1
+    lines = SAMPLES["two.ptx"]().replace(b"1 0 0 0", b"1e300 1e300 0 0", 1)
+    assert "no rigid motion" in read_scan(write(tmp_path, "a.ptx", lines)).notes[0]
+
+
+def test_wrong_sizes_of_packed_pieces_end_nothing(tmp_path: Path, capfd: pytest.CaptureFixture):
+    """What reads LAZ in parallel believes them, reserves the memory, and ends the process."""
+    pytest.importorskip("lazrs")
+    data = WITH_LIBRARIES["points.laz"][1]()
+    start = int.from_bytes(data[96:100], "little")
+    table = int.from_bytes(data[start : start + 8], "little") + 8
+    lying = data[:table] + b"\xff" * (len(data) - table)
+    assert len(read_scan(write(tmp_path, "a.laz", lying)).points) == ROWS * COLUMNS
+    head = data.index(b"laszip encoded") + 52
+    unchunked = data[:head] + b"\1\0" + data[head + 2 :]
+    with pytest.raises(ReadError, match="without chunks, as LASzip 1 did; unpack it to LAS"):
+        read_scan(write(tmp_path, "a.laz", unchunked))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_arrays_with_named_fields(tmp_path: Path):
+    """As PDAL and pyntcloud save them."""
+    shades = colors().reshape(ROWS, COLUMNS, 3)
+    fields = [(name, "<f4") for name in ("Z", "Y", "X")] + [("GpsTime", "<f8")]
+    fields += [(name, "<u2") for name in ("Red", "Green", "Blue")]
+    records = np.zeros((ROWS, COLUMNS), fields)
+    for k, name in enumerate("XYZ"):
+        records[name] = surface()[..., k]
+    for k, name in enumerate(("Red", "Green", "Blue")):
+        records[name] = 257 * shades[..., k].astype(np.uint16)
+    scan = read_scan(write(tmp_path, "a.npy", npy(records)))
+    assert_is_surface(scan)
+    assert_has_colors(scan)
+    assert scan.notes[0] == "columns ignored: gpstime"
+    scan = read_scan(write(tmp_path, "a.npy", npy(records.ravel())))
+    np.testing.assert_array_equal(scan.points, surface()[SEEN])
+    for odd in (np.zeros(9, [("x", "<f4"), ("y", "<f4")]), records[None], records[:0]):
+        with pytest.raises(ReadError, match=r"records .* save x, y and z"):
+            read_scan(write(tmp_path, "a.npy", npy(odd)))
+
+
+def test_e57_numbers_may_be_scaled():
+    libe57 = pytest.importorskip("pye57.libe57")
+    from scanweld.io.scan_formats.e57 import number_of
+
+    with TemporaryDirectory() as folder:
+        image = libe57.ImageFile(f"{folder}/a.e57", "w")
+        assert number_of(libe57.ScaledIntegerNode(image, 50, 0, 255, 0.5, 3.0)) == 28
+        assert number_of(libe57.IntegerNode(image, 7, 0, 255)) == 7
+        image.cancel()

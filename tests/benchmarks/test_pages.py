@@ -19,7 +19,7 @@ DOCS = ROOT / "docs"
 PAPER = DOCS / "paper"
 
 
-@pytest.mark.parametrize("name", ["../README.md", "benchmarks.md", "model.md"])
+@pytest.mark.parametrize("name", ["../README.md", "benchmarks.md", "model.md", "formats.md"])
 def test_measured_parts_are_those_of_the_results(name: str):
     text = (DOCS / name).read_text(encoding="utf-8")
     assert BLOCK.findall(text)
@@ -28,7 +28,7 @@ def test_measured_parts_are_those_of_the_results(name: str):
 
 def test_every_measured_part_stands_somewhere():
     text = "".join(path.read_text(encoding="utf-8") for path in pages.PAGES)
-    assert {name for _, name, _ in BLOCK.findall(text)} == set(pages.BLOCKS)
+    assert {name for _, name, _ in BLOCK.findall(text)} == {*pages.BLOCKS, pages.TABLE_OF_FORMATS}
 
 
 def test_method_is_what_its_template_and_the_results_make():

@@ -95,7 +95,13 @@ def _expand(each: Path | str) -> list[Path]:
         matches = [Path(match) for match in sorted(glob.glob(str(each)))]
         return _scans_among(matches, f"{each}: the pattern", suffix_of(path))
     if not path.exists():
-        raise ReadError(f"{path}: there is no such file; check the path")
+        link = path.is_symlink()
+        told = (
+            "is a link that leads nowhere; copy the file"
+            if link
+            else "there is no such file; check the path"
+        )
+        raise ReadError(f"{path}: {told}")
     if format_of(path) is None:
         raise ReadError(why_unread(path, formats_by_suffix()))
     return [path]

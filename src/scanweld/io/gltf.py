@@ -5,6 +5,7 @@ Specification: Khronos, "glTF 2.0".
 
 import json
 import struct
+from base64 import b64decode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,12 +33,12 @@ class Gltf:
     Attributes:
         path: For messages.
         content: The description.
-        buffer: The binary chunk.
+        chunk: The binary chunk, which is the first buffer where that is not written as text.
     """
 
     path: Path
     content: dict[str, Any]
-    buffer: memoryview
+    chunk: memoryview
 
     def broken(self, what: str) -> ReadError:
         """What is said of a file that cannot be read."""
@@ -67,20 +68,31 @@ class Gltf:
         if kind is None or width not in widths or "sparse" in told or "bufferView" not in told:
             raise self.broken("holds arrays that are sparse, packed or of a wrong type")
         view = self._entry("bufferViews", told["bufferView"])
-        if self._number(view, "buffer") != 0:
-            raise self.broken("has buffers in other files")
+        buffer = self._buffer(self._number(view, "buffer"))
         begin = self._number(view, "byteOffset")
         end = begin + self._number(view, "byteLength")
         begin += self._number(told, "byteOffset")
         size = int(kind[1:]) * width
         stride = self._number(view, "byteStride") or size
-        if end > len(self.buffer) or (count and begin + (count - 1) * stride + size > end):
+        if end > len(buffer) or (count and begin + (count - 1) * stride + size > end):
             raise self.broken("its buffer is smaller than it says (truncated?)")
         if stride < size or not count:
             raise self.broken("holds an empty array")
-        octets = np.frombuffer(self.buffer, np.uint8)[begin:end]
+        octets = np.frombuffer(buffer, np.uint8)[begin:end]
         table = np.lib.stride_tricks.as_strided(octets, (count, size), (stride, 1), writeable=False)
         return np.ascontiguousarray(table).view("<" + kind)
+
+    def _buffer(self, index: int) -> bytes | memoryview:
+        uri = self._entry("buffers", index).get("uri")
+        if uri is None and index == 0:
+            return self.chunk
+        head, _, text = str(uri).partition(",")
+        if not head.startswith("data:") or not head.endswith(";base64"):
+            raise self.broken("has buffers in other files")
+        try:
+            return b64decode(text, validate=True)
+        except ValueError as error:
+            raise self.broken("a buffer in its description is broken") from error
 
     def placed_meshes(self) -> Iterator[tuple[dict[str, Any], FloatArray]]:
         """The meshes of the scene, each with scene_from_mesh (4, 4).

@@ -91,11 +91,12 @@ def _told(dropped: BoolArray, which: str) -> tuple[str, ...]:
 
 
 def _beyond(points: FloatArray, axis: int, is_seen: BoolArray) -> tuple[BoolArray, float]:
-    """Which points (N,) have the largest coordinate, and that, if others have none nearly so."""
+    """Which points (N,) have the largest coordinate, and that, if there are others far below it."""
     size = np.where(is_seen, np.abs(points[:, axis]), 0.0)
     top = float(size.max(initial=0.0))
     is_top = is_seen & (size == top)
-    if is_top.sum() < _MANY or not top > _BEYOND * np.abs(points[is_seen & ~is_top]).max(initial=0):
+    others = np.abs(points[is_seen & ~is_top])
+    if is_top.sum() < _MANY or not len(others) or not top > _BEYOND * others.max():
         return np.zeros(len(points), dtype=bool), top
     return is_top, float(points[np.argmax(is_top), axis])
 

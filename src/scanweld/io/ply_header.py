@@ -92,6 +92,8 @@ def parse_header(path: Path, data: bytes) -> PlyHeader:
             comments.append(line.removeprefix("comment").strip())
         elif keyword == "element":
             elements.append(_element(path, line, words))
+            if [name for name, _, _ in elements].count(words[0]) > 1:
+                raise ReadError(f"{path}: two elements are called {words[0]}; export the file anew")
         elif keyword == "property":
             if not elements:
                 raise ReadError(f"{path}: '{line}' stands before any element; export the file anew")

@@ -69,7 +69,8 @@ def to_scan(path: Path, name: str, raw: RawScan) -> RangeScan:
     seen, notes = seen_points(raw.points, raw.faces)
     dropped = int((~seen).sum())
     if dropped == len(seen):
-        raise ReadError(f"{path}: holds no points, or none that is finite; leave it out")
+        told = f" ({notes[0].partition(':')[0]})" if notes else ""
+        raise ReadError(f"{path}: holds no points, or none that was seen{told}; leave it out")
     points = raw.points[seen] if dropped else raw.points
     refuse_coarse(path, points, are_vertices=raw.faces is not None and len(raw.faces) > 0)
     notes = raw.notes + notes
@@ -180,6 +181,16 @@ def to_bytes(values: NDArray, type_code: str = "") -> ByteArray | None:
     if scaled.max(initial=0.0) > 255.5 or scaled.min(initial=0.0) < 0.0:
         return None
     return np.rint(np.minimum(scaled, 255.0)).astype(np.uint8)
+
+
+def noted_bytes(
+    what: str, values: NDArray | None, type_code: str = ""
+) -> tuple[ByteArray | None, tuple[str, ...]]:
+    """What ``to_bytes`` makes of colours or intensities, and a note where it leaves them out."""
+    found = None if values is None else to_bytes(values, type_code)
+    if values is None or found is not None:
+        return found, ()
+    return None, (f"{what} ignored: on no known scale (0 to 1, 0 to 255)",)
 
 
 def _check_indices(path: Path, raw: RawScan) -> None:

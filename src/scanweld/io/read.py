@@ -1,14 +1,21 @@
-"""One door for all formats: ``read_scan`` and ``read_mesh``."""
+"""One door for all formats: ``read_scan`` and ``read_mesh``.
+
+What overflows or is no number while bytes of any kind are read is not warned of, but dropped or
+refused, as all that is not finite.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.local_origin import SHIFT_KEY, told_shift
+from scanweld.io.misnamed import BEGIN, what_it_is
 from scanweld.io.names import is_gzipped, stem_of, suffix_of
 from scanweld.io.not_scans import why_unread
 from scanweld.io.raw import RawScan, to_mesh, to_scan
@@ -16,7 +23,10 @@ from scanweld.io.scan_formats.records import Keeps, Part
 from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
 from scanweld.io.unpack import gunzip
 
+_any_bits = np.errstate(over="ignore", invalid="ignore")
 
+
+@_any_bits
 def read_scan(path: Path | str, name: str | None = None, *, part: int = 0) -> RangeScan:
     """Read a file as one scan, in the coordinates and the unit of the file.
 
@@ -35,6 +45,7 @@ def read_scan(path: Path | str, name: str | None = None, *, part: int = 0) -> Ra
     return to_scan(path, stem_of(path) if name is None else name, parts[part].read())
 
 
+@_any_bits
 def read_mesh(path: Path | str) -> TriangleMesh:
     """Read a file as a triangle mesh; polygons become fans of triangles.
 
@@ -45,6 +56,7 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     return to_mesh(path, _parts(path)[0].read())
 
 
+@_any_bits
 def part_names(path: Path) -> tuple[str, ...]:
     """What a file calls its scans, empty where it does not; of one that is broken, one such name.
 
@@ -74,12 +86,24 @@ def _parts(path: Path) -> Sequence[Part]:
     if is_empty:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
     data = gunzip(path, data) if is_gzipped(path) else data
-    found = form.read(path, data)
+    try:
+        found = form.read(path, data)
+    except ReadError as error:
+        begin = _first_bytes(path) if form.opens_path else data[:BEGIN]
+        if told := what_it_is(path, begin):
+            raise ReadError(f"{path}: {told}") from error
+        raise
     parts = [Part(read=lambda: found)] if isinstance(found, RawScan) else found
     if not parts:
         raise ReadError(f"{path}: holds no scans; leave it out")
     shift = _told_shift(path, data)
     return parts if shift is None else [_moved(part, shift) for part in parts]
+
+
+def _first_bytes(path: Path) -> bytes:
+    """Those of a file that its reader opens itself."""
+    with path.open("rb") as stream:
+        return stream.read(BEGIN)
 
 
 def _told_shift(path: Path, data: bytes) -> FloatArray | None:

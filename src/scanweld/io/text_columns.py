@@ -8,7 +8,7 @@ import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
-from scanweld.io.raw import RawScan, to_bytes
+from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.text_head import axis_name
 
 FIRST_ROWS = slice(0, 1000)
@@ -70,15 +70,8 @@ def is_index(column: FloatArray) -> bool:
 def scan_of_columns(table: FloatArray, columns: Columns) -> RawScan:
     """The scan of a table (N, columns); colours on no known scale are left out with a note."""
     colors, intensity = _taken(table, columns.colors), _taken(table, columns.intensity)
-    color_bytes = None if colors is None else to_bytes(colors, _integer_type(colors))
-    intensity_bytes = None if intensity is None else to_bytes(intensity, _integer_type(intensity))
-    notes = columns.notes
-    for what, values, read in (
-        ("colours", colors, color_bytes),
-        ("intensities", intensity, intensity_bytes),
-    ):
-        if values is not None and read is None:
-            notes += (f"{what} ignored: on no known scale (0 to 1, 0 to 255)",)
+    color_bytes, no_colors = noted_bytes("colours", colors, _integer_type(colors))
+    intensity_bytes, no_shades = noted_bytes("intensities", intensity, _integer_type(intensity))
     points = _taken(table, columns.points)
     assert points is not None
     return RawScan(
@@ -86,7 +79,7 @@ def scan_of_columns(table: FloatArray, columns: Columns) -> RawScan:
         normals=_taken(table, columns.normals),
         colors=color_bytes,
         intensity=None if intensity_bytes is None else intensity_bytes[:, 0],
-        notes=notes,
+        notes=(*columns.notes, *no_colors, *no_shades),
     )
 
 
@@ -98,8 +91,10 @@ def _places(names: Sequence[str], choices: Sequence[tuple[str, ...]]) -> tuple[i
     return ()
 
 
-def _integer_type(values: FloatArray) -> str:
+def _integer_type(values: FloatArray | None) -> str:
     """The NumPy code of two bytes where whole numbers need them, for ``to_bytes``."""
+    if values is None:
+        return ""
     return "u2" if (values == np.rint(values)).all() and 255 < values.max() <= 65535 else ""
 
 

@@ -51,7 +51,7 @@ def split_head(path: Path, text: bytes) -> tuple[Head, bytes]:
     head: list[bytes] = []
     words: list[bytes] = []
     count: int | None = None
-    for line, following in zip(lines, [*lines[1:], b""], strict=True):
+    for line, following in zip(lines, [*lines[1:], b""], strict=False):
         filled = without_comment(line).strip()
         cells = _cells(filled)
         if _are_counted_names(cells, following):

@@ -73,7 +73,14 @@ def read_intrinsics(path: Path) -> Intrinsics:
         raise ReadError(f"{path}: cannot be read ({reason}); --intrinsics takes {FORMS}") from error
     try:
         return _intrinsics(text)
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError) as error:
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        RecursionError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise ReadError(
             f"{path}: no intrinsics that can be used ({' '.join(str(error).split())[:120]}); "
             f"--intrinsics takes {FORMS}"

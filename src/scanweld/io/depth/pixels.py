@@ -1,6 +1,5 @@
 """Images of depths and masks as arrays: PNG, TIFF, NPY and NPZ."""
 
-import io
 import warnings
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import BoolArray
+from scanweld.io.scan_formats.numpy_array import read_arrays
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff")
 SUFFIXES = (*IMAGE_SUFFIXES, ".npy", ".npz")
@@ -70,15 +70,11 @@ def _image(path: Path, *, depths: bool = True) -> NDArray:
 
 def _array(path: Path) -> NDArray:
     try:
-        data = io.BytesIO(path.read_bytes())
-        loaded = np.load(data, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return loaded
-        (name,) = loaded.files
-        return loaded[name]
+        arrays = read_arrays(path, path.read_bytes())
     except OSError as error:
         raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    except Exception as error:  # a broken header raises whatever its parser does
+    if len(arrays) != 1:
         raise ReadError(
             f"{path}: is not one NumPy array of numbers; save the depths alone with numpy.save"
-        ) from error
+        )
+    return next(iter(arrays.values()))

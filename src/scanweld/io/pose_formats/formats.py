@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from scanweld.errors import ReadError
 from scanweld.io.pose_formats import (
     cloudcompare,
@@ -77,6 +79,7 @@ FORMATS: dict[str, PoseFormat] = {
 """Formats by the names that users give them."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # such numbers are no rigid motion
 def read_any_poses(path: Path) -> PoseEntries:
     """Read poses in any of the formats, told by content, and by suffix where that does not say.
 

@@ -19,6 +19,8 @@ from scanweld.io.pose_formats.records import (
     refuse_characters,
 )
 
+_MOST_DIGITS = 9
+"""Of the number of scans."""
 TITLE = "MeshLab .aln"
 _MAX_NAME_BYTES = 1000
 
@@ -37,7 +39,7 @@ def read(path: Path, text: str) -> PoseEntries:
     """
     lines = text.splitlines()
     first = lines[0].strip() if lines else ""
-    count = int(first) if first.isdecimal() else 0
+    count = int(first) if first.isdecimal() and len(first) <= _MOST_DIGITS else 0
     if not count or len(lines) < 1 + 6 * count:
         raise ReadError(
             f"{path}: does not hold the number of scans and 6 lines for each; save it anew"

@@ -64,7 +64,7 @@ def _asked(path: Path, question: Callable[[], Answer]) -> Answer:
     except ReadError:
         raise
     except Exception as error:
-        told = " ".join(str(error).split())[:100]
+        told = " ".join(str(error).partition("*")[0].split())[:100]
         raise ReadError(
             f"{path}: not an E57 file, or a broken one ({told}); copy it again or export it anew"
         ) from error
@@ -156,9 +156,9 @@ def _pose(header: Any) -> Pose | None:
     pose = header["pose"]
     turn, shift = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     if pose.isDefined("rotation"):
-        turn = np.array([float(pose["rotation"][axis].value()) for axis in "xyzw"])
+        turn = np.array([number_of(pose["rotation"][axis]) for axis in "xyzw"])
     if pose.isDefined("translation"):
-        shift = np.array([float(pose["translation"][axis].value()) for axis in "xyz"])
+        shift = np.array([number_of(pose["translation"][axis]) for axis in "xyz"])
     return Pose(rotation=rotation_of_quaternion(turn), translation=shift)
 
 
@@ -200,7 +200,12 @@ def _intensity(header: Any, columns: Columns) -> ByteArray | None:
 def _limit(header: Any, limits: str, name: str) -> float | None:
     if limits not in header.scan_fields or not header[limits].isDefined(name):
         return None
-    return float(header[limits][name].value())
+    return number_of(header[limits][name])
+
+
+def number_of(node: Any) -> float:
+    """The number of a node, whole, scaled or floating point; limits are what they limit."""
+    return float(node.scaledValue() if hasattr(node, "scaledValue") else node.value())
 
 
 def _scaled(values: FloatArray, low: float, top: float | None) -> ByteArray | None:
@@ -216,4 +221,5 @@ FORMAT = ScanFormat(
     keeps=(Keeps.SCANS, Keeps.GRID, Keeps.SENSOR, Keeps.POSE, Keeps.NORMALS, Keeps.COLORS),
     extra="e57",
     opens_path=True,
+    begins=(b"ASTM-E57",),
 )

@@ -122,5 +122,8 @@ def _colors(values: NDArray | None) -> ByteArray | None:
 
 
 FORMAT = ScanFormat(
-    suffixes=(".glb",), read=read_glb, keeps=(Keeps.FACES, Keeps.NORMALS, Keeps.COLORS)
+    suffixes=(".glb",),
+    read=read_glb,
+    keeps=(Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
+    begins=(b"glTF",),
 )

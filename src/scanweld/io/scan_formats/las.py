@@ -2,6 +2,7 @@
 
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,11 @@ from scanweld.geometry.arrays import ByteArray
 from scanweld.io.raw import RawScan, side_by_side, to_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat, needed
 from scanweld.io.unpack import MOST_EXPANSION, SMALL
+
+_LASZIP_RECORD = 22204
+"""Number of the record that tells how a LAZ file is packed,"""
+_UNCHUNKED = b"\1\0"
+"""and how it begins where the points are one piece."""
 
 
 def read_las(path: Path, data: bytes) -> RawScan:
@@ -21,9 +27,11 @@ def read_las(path: Path, data: bytes) -> RawScan:
     laspy = needed(path, "laspy", "las")
     _check_records(path, data)
     try:
-        with laspy.open(BytesIO(data)) as reader:
+        # Of the two, the parallel one believes the table of packed pieces and ends the process.
+        with laspy.open(BytesIO(data), laz_backend=laspy.LazBackend.Lazrs) as reader:
             header = reader.header
             size = header.point_count * header.point_format.size
+            _check_packing(path, data, header)
             if size > max(SMALL, MOST_EXPANSION * len(data)):
                 raise ReadError(
                     f"{path}: says {header.point_count} points, more than it can hold; copy it "
@@ -61,13 +69,29 @@ def _check_records(path: Path, data: bytes) -> None:
     count, num_extended = int.from_bytes(data[100:104], "little"), 0
     if len(data) >= 247 and data[25] >= 4:
         num_extended = int.from_bytes(data[243:247], "little")
-    start = int.from_bytes(data[96:100], "little")
-    is_cut = len(data) < 227 or not data.startswith(b"LASF") or start > len(data)
-    if is_cut or 54 * count + 60 * num_extended > len(data) or _num_chunks(data, start) > len(data):
-        raise ReadError(
-            f"{path}: not a LAS or LAZ file, or a broken one (its records are longer than it); "
-            "copy it again or export it anew"
-        )
+    is_cut = len(data) < 227 or not data.startswith(b"LASF") or _start(data) > len(data)
+    if is_cut or 54 * count + 60 * num_extended > len(data):
+        raise _too_long(path)
+
+
+def _start(data: bytes) -> int:
+    return int.from_bytes(data[96:100], "little")
+
+
+def _too_long(path: Path) -> ReadError:
+    return ReadError(
+        f"{path}: not a LAS or LAZ file, or a broken one (its records are longer than it); copy it "
+        "again or export it anew"
+    )
+
+
+def _check_packing(path: Path, data: bytes, header: Any) -> None:
+    """Refuse a packed file at which what lies below laspy would panic, and print that it does."""
+    told = [vlr.record_data_bytes() for vlr in header.vlrs if vlr.record_id == _LASZIP_RECORD]
+    if any(record[:2] == _UNCHUNKED for record in told):
+        raise ReadError(f"{path}: is packed without chunks, as LASzip 1 did; unpack it to LAS")
+    if _num_chunks(data, _start(data)) > len(data):
+        raise _too_long(path)
 
 
 def _num_chunks(data: bytes, start: int) -> int:
@@ -95,4 +119,10 @@ def _shades(values: np.ndarray) -> ByteArray | None:
     return to_bytes(values, "u2") if len(values) and values.min() < values.max() else None
 
 
-FORMAT = ScanFormat(suffixes=(".las", ".laz"), read=read_las, keeps=(Keeps.COLORS,), extra="las")
+FORMAT = ScanFormat(
+    suffixes=(".las", ".laz"),
+    read=read_las,
+    keeps=(Keeps.COLORS,),
+    extra="las",
+    begins=(b"LASF",),
+)

@@ -1,9 +1,10 @@
-"""Arrays of NumPy: (N, 3) points, or (H, W, 3), a grid; NPZ with points, normals and colors."""
+"""Arrays of NumPy: (N, 3) points, or (H, W, 3), a grid, or with named fields; NPZ of these."""
 
 import ast
 import re
 import zipfile
 import zlib
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray
-from scanweld.io.raw import RawScan, full_grid, to_bytes
+from scanweld.io.raw import RawScan, full_grid, noted_bytes, side_by_side
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
+from scanweld.io.text_columns import columns_by_name, scan_of_columns
+from scanweld.io.text_head import column_names
 from scanweld.io.unpack import read_bounded
 
 _MAGIC = b"\x93NUMPY"
@@ -32,9 +35,7 @@ def read_numpy(path: Path, data: bytes) -> RawScan:
     Raises:
         ReadError: If it is broken, holds objects, or its arrays have other shapes.
     """
-    if not data.startswith(b"PK"):
-        return _raw_scan(path, {"points": _array(path, data)}, ())
-    arrays = _unzipped(path, data)
+    arrays = read_arrays(path, data)
     found = {
         key: arrays[name]
         for key, names in _KEYS.items()
@@ -53,8 +54,19 @@ def read_numpy(path: Path, data: bytes) -> RawScan:
     return _raw_scan(path, found, told)
 
 
+def read_arrays(path: Path, data: bytes) -> dict[str, NDArray]:
+    """The arrays of a NPZ file by their names, or that of a NPY file under no name.
+
+    Raises:
+        ReadError: If it is broken, or holds objects.
+    """
+    return _unzipped(path, data) if data.startswith(b"PK") else {"": _array(path, data)}
+
+
 def _raw_scan(path: Path, found: dict[str, NDArray], notes: tuple[str, ...]) -> RawScan:
     shape = found["points"].shape
+    if found["points"].dtype.names is not None:
+        return _of_fields(path, found["points"])
     if len(shape) not in (2, 3) or shape[-1] != 3:
         raise ReadError(
             f"{path}: its points have the shape {shape}; give (N, 3), or (rows, columns, 3)"
@@ -65,23 +77,40 @@ def _raw_scan(path: Path, found: dict[str, NDArray], notes: tuple[str, ...]) -> 
                 f"{path}: its {key} have the shape {array.shape}, its points {shape}; make them fit"
             )
     normals = found.get("normals")
+    colors, no_colors = _colors(found.get("colors"))
     return RawScan(
         points=_rows(found["points"]),
         grid=full_grid(*shape[:2]) if len(shape) == 3 else None,
         normals=None if normals is None else _rows(normals),
-        colors=_colors(found.get("colors")),
-        notes=notes,
+        colors=colors,
+        notes=(*notes, *no_colors),
     )
+
+
+def _of_fields(path: Path, array: NDArray) -> RawScan:
+    """The points of an array (N,) or (rows, columns) of records, by the names of its fields."""
+    names = tuple(array.dtype.names or ())
+    known = column_names(" ".join(names))
+    if len(known) != len(names) or array.ndim not in (1, 2) or not array.size:
+        raise ReadError(
+            f"{path}: holds records {array.shape} of {', '.join(names)[:80]}; save x, y and z of "
+            "the points"
+        )
+    table = side_by_side([array[name].ravel() for name in names])
+    raw = scan_of_columns(table, columns_by_name(path, known))
+    is_grid = array.ndim == 2 and min(array.shape) > 1
+    return replace(raw, grid=full_grid(*array.shape) if is_grid else None)
 
 
 def _rows(array: NDArray) -> FloatArray:
     return np.ascontiguousarray(array.reshape(-1, array.shape[-1]), dtype=np.float64)
 
 
-def _colors(array: NDArray | None) -> ByteArray | None:
+def _colors(array: NDArray | None) -> tuple[ByteArray | None, tuple[str, ...]]:
     if array is None:
-        return None
-    return to_bytes(array.reshape(-1, array.shape[-1])[:, :3], array.dtype.str[1:])
+        return None, ()
+    rows = array.reshape(-1, array.shape[-1])[:, :3]
+    return noted_bytes("colours", rows, array.dtype.str[1:])
 
 
 def _unzipped(path: Path, data: bytes) -> dict[str, NDArray]:
@@ -111,13 +140,14 @@ def _array(path: Path, data: bytes) -> NDArray:
         kind, shape, is_fortran = told["descr"], told["shape"], told["fortran_order"]
     except (ValueError, SyntaxError, RecursionError, MemoryError, TypeError, KeyError) as error:
         raise broken from error
-    if not isinstance(kind, str) or not _TYPE.fullmatch(kind):
+    types = [kind] if isinstance(kind, str) else [code for _, code in _fields(kind)]
+    if not types or not all(map(_TYPE.fullmatch, types)):
         raise ReadError(f"{path}: holds {kind!r}, not numbers; save the points as numbers")
     if not isinstance(shape, tuple) or not all(type(n) is int and n >= 0 for n in shape):
         raise broken
     try:
         kind = np.dtype(kind)
-    except TypeError as error:
+    except (TypeError, ValueError) as error:
         raise broken from error
     count = 1
     for n in shape:
@@ -129,9 +159,20 @@ def _array(path: Path, data: bytes) -> NDArray:
     )
 
 
+def _fields(kind: object) -> list[tuple[str, str]]:
+    """Names and types of the fields of records, none if it is something else."""
+    fields = kind if isinstance(kind, list) else []
+    are_plain = all(
+        isinstance(field, tuple) and [type(part) for part in field] == [str, str]
+        for field in fields
+    )
+    return fields if are_plain else []
+
+
 FORMAT = ScanFormat(
     suffixes=(".npy", ".npz"),
     read=read_numpy,
     keeps=(Keeps.GRID, Keeps.NORMALS, Keeps.COLORS),
     only_named=(".npy", ".npz"),
+    begins=(_MAGIC, b"PK"),
 )

@@ -6,8 +6,11 @@ import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.io.mesh_lines import broken_line, fan_faces, filled_lines
-from scanweld.io.raw import RawScan, to_bytes
+from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
+
+_NO_INDEX = 2**31
+"""No file has so many vertices."""
 
 
 def read_obj(path: Path, data: bytes) -> RawScan:
@@ -39,14 +42,15 @@ def read_obj(path: Path, data: bytes) -> RawScan:
     if len(sizes) > 1 or sizes[0] not in (3, 4, 6, 7):
         raise ReadError(f"{path}: its vertices have {sizes} numbers, not all 3; export it anew")
     table = np.array(vertices)
-    colors = to_bytes(table[:, -3:], "f8") if sizes[0] >= 6 else None
-    return RawScan(points=table[:, :3], faces=faces, colors=colors)
+    found = table[:, -3:] if sizes[0] >= 6 else None
+    colors, notes = noted_bytes("colours", found, "f8")
+    return RawScan(points=table[:, :3], faces=faces, colors=colors, notes=notes)
 
 
 def _obj_index(word: bytes, num_vertices: int) -> int:
     """The vertex of a corner such as 7, 7/1, 7//3 or -1 (the last one so far), from 0."""
     index = int(word.partition(b"/")[0])
-    if index == 0 or index < -num_vertices:
+    if index == 0 or not -num_vertices <= index < _NO_INDEX:
         raise ValueError("OBJ counts from 1, or back from -1")
     return index - 1 if index > 0 else num_vertices + index
 

@@ -8,7 +8,7 @@ import numpy as np
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.io.mesh_lines import broken_line, fan_faces, filled_lines
-from scanweld.io.raw import RawScan, to_bytes
+from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text import is_number
 
@@ -40,12 +40,13 @@ def read_off(path: Path, data: bytes) -> RawScan:
     table = _off_vertices(path, rows[:num_vertices])
     after = 6 if kind[2] else 3
     colored = bool(kind[1]) and table.shape[1] >= after + 3
-    colors = table[:, after : after + 3]
+    colors, notes = noted_bytes("colours", table[:, after : after + 3] if colored else None)
     return RawScan(
         points=table[:, :3],
         faces=_off_faces(path, rows[num_vertices:]),
         normals=table[:, 3:6] if kind[2] and table.shape[1] >= 6 else None,
-        colors=to_bytes(colors) if colored else None,
+        colors=colors,
+        notes=notes,
     )
 
 
@@ -78,5 +79,8 @@ def _off_faces(path: Path, rows: list[tuple[int, list[bytes]]]) -> IntArray | No
 
 
 FORMAT = ScanFormat(
-    suffixes=(".off",), read=read_off, keeps=(Keeps.FACES, Keeps.NORMALS, Keeps.COLORS)
+    suffixes=(".off",),
+    read=read_off,
+    keeps=(Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
+    begins=(b"OFF", b"COFF", b"NOFF", b"CNOFF"),
 )

@@ -13,7 +13,7 @@ from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.io.lzf import lzf_decompress
 from scanweld.io.pcd_header import PcdField, PcdHeader, parse_pcd_header
-from scanweld.io.raw import RawScan, full_grid, side_by_side, to_bytes
+from scanweld.io.raw import RawScan, full_grid, noted_bytes, side_by_side
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text import parse_numbers
 from scanweld.io.viewed_from import viewpoint_told
@@ -39,7 +39,10 @@ def read_pcd(path: Path, data: bytes) -> RawScan:
     points = _three(columns, ("x", "y", "z"))
     if points is None:
         raise ReadError(f"{path}: its points lack x, y or z; export the scan with its points")
-    colors, used = _colors(columns)
+    colors, used, no_colors = _colors(columns)
+    shades = columns.get("intensity")
+    kind = "" if shades is None else shades.dtype.str[1:]
+    intensity, no_shades = noted_bytes("intensities", shades, kind)
     grid = full_grid(header.height, header.width) if header.height > 1 else None
     pose, notes = (None, ()) if grid is not None else _viewpoint(header, points)
     known = {"x", "y", "z", "intensity", _PADDING, *used, *(n for names in _NORMALS for n in names)}
@@ -52,9 +55,14 @@ def read_pcd(path: Path, data: bytes) -> RawScan:
         grid=grid,
         normals=normals,
         colors=colors,
-        intensity=_intensity(columns),
+        intensity=intensity,
         scan_from_sensor=pose,
-        notes=(*((f"fields left out: {', '.join(left_out)}",) if left_out else ()), *notes),
+        notes=(
+            *((f"fields left out: {', '.join(left_out)}",) if left_out else ()),
+            *no_colors,
+            *no_shades,
+            *notes,
+        ),
     )
 
 
@@ -158,25 +166,19 @@ def _three(columns: Columns, names: tuple[str, ...]) -> FloatArray | None:
     return side_by_side(found) if len(found) == len(names) else None
 
 
-def _colors(columns: Columns) -> tuple[ByteArray | None, tuple[str, ...]]:
-    """Red, green, blue (N, 3), and the fields that they come from."""
+def _colors(columns: Columns) -> tuple[ByteArray | None, tuple[str, ...], tuple[str, ...]]:
+    """Red, green, blue (N, 3), the fields that they come from, and a note on them."""
     for name in _PACKED:
         if name in columns and columns[name].itemsize == 4:
             bits = np.ascontiguousarray(columns[name]).view("<u4")
-            return np.stack([(bits >> shift & 255).astype(np.uint8) for shift in (16, 8, 0)], 1), (
-                name,
-            )
+            parts = [(bits >> shift & 255).astype(np.uint8) for shift in (16, 8, 0)]
+            return np.stack(parts, axis=1), (name,), ()
     for names in _COLORS:
         values = _three(columns, names)
-        colors = None if values is None else to_bytes(values, columns[names[0]].dtype.str[1:])
-        if colors is not None:
-            return colors, names
-    return None, ()
-
-
-def _intensity(columns: Columns) -> ByteArray | None:
-    values = columns.get("intensity")
-    return None if values is None else to_bytes(values, values.dtype.str[1:])
+        if values is not None:
+            colors, notes = noted_bytes("colours", values, columns[names[0]].dtype.str[1:])
+            return colors, names, notes
+    return None, (), ()
 
 
 def _viewpoint(header: PcdHeader, points: FloatArray) -> tuple[Pose | None, tuple[str, ...]]:
@@ -193,5 +195,6 @@ def _viewpoint(header: PcdHeader, points: FloatArray) -> tuple[Pose | None, tupl
 FORMAT = ScanFormat(
     suffixes=(".pcd",),
     read=read_pcd,
+    begins=(b"# .PCD",),
     keeps=(Keeps.GRID, Keeps.SENSOR, Keeps.NORMALS, Keeps.COLORS),
 )

@@ -1,6 +1,5 @@
 """PLY of Stanford, ASCII or binary: points, range grids and meshes, with a sensor's place."""
 
-import logging
 import re
 from pathlib import Path
 
@@ -14,11 +13,9 @@ from scanweld.geometry.pose import Pose
 from scanweld.io.matrices import pose_from_numbers
 from scanweld.io.ply_body import Columns, Ragged, decode_body
 from scanweld.io.ply_header import PlyElement, PlyHeader, parse_header
-from scanweld.io.raw import RawScan, fan_triangles, full_grid, side_by_side, to_bytes
+from scanweld.io.raw import RawScan, fan_triangles, full_grid, noted_bytes, side_by_side
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.viewed_from import viewpoint_told
-
-logger = logging.getLogger(__name__)
 
 CAMERA_KEY = "scanweld_camera"
 """``obj_info`` key of a camera: model, width, height, fx, fy, cx, cy."""
@@ -30,6 +27,9 @@ _COLORS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
 )
+_OF_MODELS = ("confidence", "support", "stdev", "filled", "scan")
+_KNOWN = {*"xyz", "nx", "ny", "nz", "intensity", "alpha", *_OF_MODELS}.union(*_COLORS)
+"""Properties of a vertex that are read, or need no word."""
 _LARGEST_INDEX = 2**53
 """Above this a double, as which the numbers of ASCII files are read, is not exact."""
 _SHORT_NUMBER = re.compile(r"[0-9]{1,9}")
@@ -68,13 +68,17 @@ def read_ply(path: Path, data: bytes) -> RawScan:
     if pose is None and grid is None:
         pose, told = _seen_from(tables.get("camera", {}), points)
         notes += told
-    intensity = _bytes(path, element, vertex, ("intensity",))
+    intensity, no_shades = _bytes("intensities", element, vertex, ("intensity",))
+    colors, no_colors = _colors(element, vertex)
+    ignored = [name for name in vertex if name not in _KNOWN]
+    told = (f"properties ignored: {', '.join(ignored)[:200]}",) if ignored else ()
+    notes += (*no_shades, *no_colors, *told)
     return RawScan(
         points=points,
         grid=grid,
         faces=_faces(header, tables),
         normals=_stack(vertex, ("nx", "ny", "nz")),
-        colors=_colors(path, element, vertex),
+        colors=colors,
         intensity=None if intensity is None else intensity[:, 0],
         confidence=_column(vertex, "confidence"),
         support=_column(vertex, "support"),
@@ -106,28 +110,23 @@ def _scalars(columns: Columns, names: tuple[str, ...]) -> list[NDArray] | None:
 
 
 def _bytes(
-    path: Path, element: PlyElement, columns: Columns, names: tuple[str, ...]
-) -> ByteArray | None:
-    """Columns as bytes (N, k), by the types that the header declares; None if missing."""
+    what: str, element: PlyElement, columns: Columns, names: tuple[str, ...]
+) -> tuple[ByteArray | None, tuple[str, ...]]:
+    """Columns as bytes (N, k), by the types that the header declares, and a note on them."""
     types = {prop.name: prop.type for prop in element.properties}
     found = _scalars(columns, names)
     if found is None:
-        return None
+        return None, ()
     if all(types[name] == "u1" for name in names):
-        return np.stack(found, axis=1)
-    scaled = to_bytes(side_by_side(found), types[names[0]])
-    if scaled is None:
-        logger.warning("%s: %s are on no known scale, so they are left out", path, ", ".join(names))
-    return scaled
+        return np.stack(found, axis=1), ()
+    return noted_bytes(what, side_by_side(found), types[names[0]])
 
 
-def _colors(path: Path, element: PlyElement, columns: Columns) -> ByteArray | None:
+def _colors(element: PlyElement, columns: Columns) -> tuple[ByteArray | None, tuple[str, ...]]:
     """Red, green and blue (N, 3), under the first of their usual names that is there."""
-    for names in _COLORS:
-        found = _bytes(path, element, columns, names)
-        if found is not None:
-            return found
-    return None
+    there = (names for names in _COLORS if _scalars(columns, names) is not None)
+    names = next(there, None)
+    return (None, ()) if names is None else _bytes("colours", element, columns, names)
 
 
 def _index_list(path: Path, columns: Columns) -> tuple[IntArray | ByteArray, IntArray] | None:
@@ -151,7 +150,6 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
         raise ReadError(f"{header.path}: its range_grid has no list vertex_indices; export it anew")
     shape = (header.info.get("num_rows", ""), header.info.get("num_cols", ""))
     if not all(_SHORT_NUMBER.fullmatch(text) for text in shape):
-        logger.warning("%s: range_grid without num_rows and num_cols, left out", header.path)
         return None, ("range grid of unknown shape left out",)
     rows, columns = (int(text) for text in shape)
     if rows * columns != element.count:
@@ -233,5 +231,6 @@ def _sensor_pose(header: PlyHeader) -> Pose | None:
 FORMAT = ScanFormat(
     suffixes=(".ply",),
     read=read_ply,
+    begins=(b"ply\n", b"ply\r"),
     keeps=(Keeps.GRID, Keeps.SENSOR, Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
 )

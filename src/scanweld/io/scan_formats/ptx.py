@@ -15,7 +15,7 @@ from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.io.matrices import pose_from_numbers
-from scanweld.io.raw import RawScan, to_bytes
+from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, Part, ScanFormat
 from scanweld.io.text import parse_numbers, words_per_line
 
@@ -78,18 +78,21 @@ def _scan(path: Path, text: bytes, line: int, head: FloatArray) -> RawScan:
     table = parse_numbers(path, text, line).reshape(-1, width)
     points = np.where((table[:, :3] == 0).all(axis=1)[:, None], np.nan, table[:, :3])
     pose, note = _pose(head[14:])
+    colors, no_colors = _colors(table[:, 4:] if width == 7 else None)
+    intensity, no_shades = noted_bytes("intensities", table[:, 3], "f8")
     return RawScan(
         points=points,
         grid=np.ascontiguousarray(np.arange(len(points)).reshape(columns, rows).T),
-        colors=_colors(table[:, 4:]) if width == 7 else None,
-        intensity=to_bytes(table[:, 3], "f8"),
+        colors=colors,
+        intensity=intensity,
         world_from_scan=pose,
-        notes=(note,) if note else (),
+        notes=(*((note,) if note else ()), *no_colors, *no_shades),
     )
 
 
-def _colors(values: FloatArray) -> ByteArray | None:
-    return to_bytes(values, "u1" if values.max(initial=0) > 1 else "")
+def _colors(values: FloatArray | None) -> tuple[ByteArray | None, tuple[str, ...]]:
+    kind = "u1" if values is not None and values.max(initial=0) > 1 else ""
+    return noted_bytes("colours", values, kind)
 
 
 def _pose(numbers: FloatArray) -> tuple[Pose | None, str]:

@@ -53,6 +53,7 @@ class ScanFormat:
             it is left alone in a folder.
         extra: Name of the optional dependencies that the reader needs.
         opens_path: Whether the reader opens the path itself; it is then given no bytes.
+        begins: What its files begin with, one of these; empty where that does not tell them.
     """
 
     suffixes: tuple[str, ...]
@@ -61,6 +62,7 @@ class ScanFormat:
     only_named: tuple[str, ...] = ()
     extra: str = ""
     opens_path: bool = False
+    begins: tuple[bytes, ...] = ()
 
 
 def needed(path: Path, library: str, extra: str) -> ModuleType:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.io.mesh_lines import broken_line, filled_lines
 from scanweld.io.raw import RawScan
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
@@ -28,7 +28,7 @@ def read_stl(path: Path, data: bytes) -> RawScan:
     num_facets = int.from_bytes(data[80:_STL_HEAD], "little")
     if len(data) == _STL_HEAD + _STL_FACET.itemsize * num_facets:
         facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEAD)
-        corners = facets["corners"].reshape(-1, 3).astype(np.float64)
+        corners = np.ascontiguousarray(facets["corners"]).reshape(-1, 3)
     elif data.lstrip()[:5].lower() == b"solid" and b"endsolid" in data:
         corners = _ascii_corners(path, data)
     else:
@@ -38,7 +38,8 @@ def read_stl(path: Path, data: bytes) -> RawScan:
     points, index = _merged(corners)
     faces = index.reshape(-1, 3)
     a, b, c = faces.T
-    return RawScan(points=points, faces=faces[(a != b) & (b != c) & (c != a)])
+    is_whole = (a != b) & (b != c) & (c != a)
+    return RawScan(points=points, faces=faces if is_whole.all() else faces[is_whole])
 
 
 def _ascii_corners(path: Path, data: bytes) -> FloatArray:
@@ -52,49 +53,54 @@ def _ascii_corners(path: Path, data: bytes) -> FloatArray:
     return np.array(corners, dtype=np.float64).reshape(-1, 3)
 
 
-def _merged(corners: FloatArray) -> tuple[FloatArray, IntArray]:
+def _merged(corners: NDArray[np.floating]) -> tuple[FloatArray, IntArray]:
     """Different points in the order of their first appearance, and each corner's index."""
-    table = np.full(1 << (2 * len(corners) + 1).bit_length(), -1, dtype=np.int64)
-    words = (corners + 0.0).view(np.uint64)
-    first, index = _first_alike(corners, words, table)
-    return corners[first], index
+    corners = corners + corners.dtype.type(0)  # no minus zero
+    table = np.full(1 << (4 * len(corners) // 3 + 1).bit_length(), -1, dtype=np.int32)
+    words = corners.view(np.uint32)
+    is_nan = np.asarray(np.isnan(corners).any(axis=1))
+    first, index = _first_alike(words, is_nan, table)
+    return corners[first].astype(np.float64), index
 
 
 @njit(cache=True, nogil=True)
 def _first_alike(
-    points: FloatArray, words: NDArray[np.uint64], table: IntArray
+    words: NDArray[np.uint32], is_nan: BoolArray, table: NDArray[np.int32]
 ) -> tuple[IntArray, IntArray]:  # pragma: no cover - compiled
     """Where each different point (D,) appears first, and which of them each point (N,) is.
 
     Args:
-        points: (N, 3); NaN is like nothing.
-        words: (N, 3) their bits, the same for like ones.
+        words: (N, k) bits of the points, the same for like ones.
+        is_nan: (N,) which points are like nothing.
         table: (2^k,) with more than N entries, all -1.
     """
-    first, index = np.empty(len(points), dtype=np.int64), np.empty(len(points), dtype=np.int64)
-    count = 0
-    for i in range(len(points)):
-        x, y, z = points[i]
-        place, found = 0, -1
-        if x == x and y == y and z == z:
-            bits = words[i, 0] * np.uint64(0x9E3779B97F4A7C15) ^ words[i, 1]
-            bits = (bits ^ (bits >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9) ^ words[i, 2]
-            bits = (bits ^ (bits >> np.uint64(32))) * np.uint64(0x94D049BB133111EB)
-            place = np.int64((bits ^ (bits >> np.uint64(31))) & np.uint64(len(table) - 1))
+    first, index = np.empty(len(words), dtype=np.int64), np.empty(len(words), dtype=np.int64)
+    count, last = 0, np.int64(len(table) - 1)
+    for i in range(len(words)):
+        found = -1
+        if not is_nan[i]:
+            bits = np.uint64(0)
+            for axis in range(words.shape[1]):
+                bits = (bits ^ np.uint64(words[i, axis])) * np.uint64(0x9E3779B97F4A7C15)
+                bits ^= bits >> np.uint64(29)
+            place = np.int64(bits >> np.uint64(32)) & last
             while table[place] >= 0:
-                k = first[table[place]]
-                if points[k, 0] == x and points[k, 1] == y and points[k, 2] == z:
-                    found = table[place]
+                k = table[place]
+                axis = 0
+                while axis < words.shape[1] and words[k, axis] == words[i, axis]:
+                    axis += 1
+                if axis == words.shape[1]:
+                    found = index[k]
                     break
-                place = (place + 1) & (len(table) - 1)
+                place = (place + 1) & last
             if found < 0:
-                table[place] = count
+                table[place] = i
         if found < 0:
             found = count
             first[count] = i
             count += 1
         index[i] = found
-    return first[:count], index
+    return first[:count].copy(), index
 
 
-FORMAT = ScanFormat(suffixes=(".stl",), read=read_stl, keeps=(Keeps.FACES,))
+FORMAT = ScanFormat(suffixes=(".stl",), read=read_stl, keeps=(Keeps.FACES,), begins=(b"solid ",))

@@ -174,5 +174,6 @@ class _Sections:
 FORMAT = ScanFormat(
     suffixes=(".vtk",),
     read=read_vtk,
+    begins=(b"# vtk DataFile",),
     keeps=(Keeps.GRID, Keeps.FACES, Keeps.NORMALS, Keeps.COLORS),
 )

@@ -1,0 +1,178 @@
+"""How fast files of two million points are read, in CPU seconds, and how much memory that takes.
+
+    python -m benchmarks.reading    every binary format; python -m benchmarks.pages writes the table
+
+Each file is read in a process of its own, after a small one, so that compiled code is loaded.
+"""
+
+import argparse
+import gzip
+import multiprocessing
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import fuzz
+from benchmarks.results import DATA, Json, write_results
+from benchmarks.sample_files import pcd_head
+from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.mesh import TriangleMesh
+from scanweld.io import read_scan
+from scanweld.io.mesh_write import glb_bytes, stl_bytes
+
+ROWS, COLUMNS = 1000, 2000
+MOST_SECONDS = 2.0
+_LITERALS = 32
+"""Bytes that LZF takes over as they are, at most, after one that says how many."""
+
+
+def points() -> FloatArray:
+    """A grid of points (N, 3), rough as measured ones, exact in single precision."""
+    v, u = np.mgrid[:ROWS, :COLUMNS] / COLUMNS
+    rough = np.random.default_rng(0).normal(scale=1e-4, size=u.shape)
+    grid = np.stack([u, v, 2 + np.sin(9 * u) * np.cos(7 * v) / 9 + rough], axis=-1)
+    return grid.reshape(-1, 3).astype(np.float32).astype(np.float64)
+
+
+def _faces() -> IntArray:
+    corner = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS)
+    a, b, c, d = (
+        x.ravel() for x in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:])
+    )
+    return np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)])
+
+
+def _ply(kind: str, *, with_faces: bool = False) -> bytes:
+    found = points().astype(kind)
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(found)}\n"
+    name = "float" if kind == "<f4" else "double"
+    head += "".join(f"property {name} {axis}\n" for axis in "xyz")
+    if not with_faces:
+        return head.encode() + b"end_header\n" + found.tobytes()
+    corners = _faces()
+    faces = np.zeros(len(corners), [("n", "u1"), ("corners", "<i4", 3)])
+    faces["n"], faces["corners"] = 3, corners
+    head += f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    return head.encode() + found.tobytes() + faces.tobytes()
+
+
+def _pcd(*, is_compressed: bool) -> bytes:
+    found = points().astype("<f4")
+    kind = "binary_compressed" if is_compressed else "binary"
+    head = pcd_head("x y z", "4 4 4", "F F F", kind, shape=(ROWS, COLUMNS))
+    if not is_compressed:
+        return head + found.tobytes()
+    whole = np.frombuffer(np.ascontiguousarray(found.T).tobytes(), np.uint8)
+    pieces = whole.reshape(-1, _LITERALS)
+    packed = np.insert(pieces, 0, _LITERALS - 1, axis=1).tobytes()
+    return head + struct.pack("<II", len(packed), len(whole)) + packed
+
+
+def _e57() -> bytes:
+    pye57 = import_module("pye57")
+    rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
+    table = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points().T.copy(), strict=True))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.e57"
+        file = pye57.E57(str(path), mode="w")
+        file.write_scan_raw({**table, "rowIndex": rows, "columnIndex": columns}, name="one")
+        file.close()
+        return path.read_bytes()
+
+
+def _las(*, is_packed: bool) -> bytes:
+    laspy = import_module("laspy")
+    header = laspy.LasHeader(point_format=0, version="1.2")
+    header.scales = np.full(3, 1e-5)
+    found, stream = laspy.LasData(header), BytesIO()
+    found.xyz = points()
+    found.write(stream, do_compress=is_packed)
+    return stream.getvalue()
+
+
+def _numpy(save: Callable[..., None]) -> bytes:
+    stream = BytesIO()
+    save(stream, points().reshape(ROWS, COLUMNS, 3))
+    return stream.getvalue()
+
+
+def _vtk() -> bytes:
+    head = f"# vtk DataFile Version 4.2\na\nBINARY\nDATASET STRUCTURED_GRID\nDIMENSIONS {COLUMNS} "
+    head += f"{ROWS} 1\nPOINTS {ROWS * COLUMNS} float\n"
+    return head.encode() + points().astype(">f4").tobytes()
+
+
+def _mesh() -> TriangleMesh:
+    return TriangleMesh(vertices=points(), faces=_faces())
+
+
+FILES: dict[str, Callable[[], bytes]] = {
+    "float.ply": lambda: _ply("<f4"),
+    "double.ply": lambda: _ply("<f8"),
+    "mesh.ply": lambda: _ply("<f4", with_faces=True),
+    "float.ply.gz": lambda: gzip.compress(_ply("<f4"), compresslevel=1),
+    "binary.pcd": lambda: _pcd(is_compressed=False),
+    "compressed.pcd": lambda: _pcd(is_compressed=True),
+    "grid.e57": _e57,
+    "points.las": lambda: _las(is_packed=False),
+    "points.laz": lambda: _las(is_packed=True),
+    "grid.npy": lambda: _numpy(np.save),
+    "grid.npz": lambda: _numpy(np.savez_compressed),
+    "grid.vtk": _vtk,
+    "mesh.glb": lambda: glb_bytes(_mesh()),
+    "mesh.stl": lambda: stl_bytes(_mesh()),
+}
+"""Makers of the files by their names."""
+WARM = {"mesh.stl": "binary.stl", "mesh.ply": "big_endian.ply", "compressed.pcd": "compressed.pcd"}
+"""Small files whose reading loads the compiled code that others need."""
+
+
+def measured(path: Path) -> Json:
+    """How long a file takes to be read, and how much memory at most."""
+    if path.name in WARM:
+        small = path.with_name(f"small{path.suffix}")
+        small.write_bytes(fuzz.samples()[WARM[path.name]]())
+        read_scan(small)
+    before, begin = fuzz.peak_megabytes(), time.process_time()
+    count = len(read_scan(path).points)
+    seconds = time.process_time() - begin
+    return {
+        **{"name": path.name, "points": count, "size": path.stat().st_size / 1e6},
+        **{"seconds": seconds, "megabytes": fuzz.peak_megabytes() - before},
+    }
+
+
+def _write(path: Path) -> None:
+    path.write_bytes(FILES[path.name]())
+
+
+def over_files(records: Sequence[Json]) -> Json:
+    """The records, and the floor."""
+    return {"files": records, "most": MOST_SECONDS}
+
+
+def main() -> int:
+    """Measure every file, each in a process of its own; 1 if one takes too long."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.reading", description=__doc__)
+    parser.add_argument("--out", type=Path, default=DATA / "reading.json")
+    options = parser.parse_args()
+    records = []
+    fork = multiprocessing.get_context("fork")
+    for name in FILES:
+        with tempfile.TemporaryDirectory() as folder, fork.Pool(1, maxtasksperchild=1) as pool:
+            pool.apply(_write, (Path(folder) / name,))
+            records.append(pool.apply(measured, (Path(folder) / name,)))
+        print(records[-1], flush=True)
+        write_results(options.out, records)
+    return int(any(record["seconds"] > MOST_SECONDS for record in records))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

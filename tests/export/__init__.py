@@ -1,0 +1,1 @@
+"""What ``scanweld export`` writes, and what ``scanweld fuse`` makes of known poses."""
