@@ -60,7 +60,7 @@ def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
     if settings.mask is not None:
         depth, cut = _masked(path, depth, settings.mask)
         notes += cut
-    return _scan(name, depth, camera, notes)
+    return scan_of_depth(name, depth, camera, notes)
 
 
 def camera_of(path: Path, intrinsics: Intrinsics, shape: tuple[int, int]) -> Camera:
@@ -138,7 +138,10 @@ def _masked(path: Path, depth: FloatArray, mask: Path) -> tuple[FloatArray, tupl
     return np.where(is_object, depth, np.nan), (f"cut to its mask: {100 * kept:.0f} % of it kept",)
 
 
-def _scan(name: str, depth: FloatArray, camera: Camera, notes: tuple[str, ...]) -> RangeScan:
+def scan_of_depth(
+    name: str, depth: FloatArray, camera: Camera, notes: tuple[str, ...] = ()
+) -> RangeScan:
+    """A depth image (H, W), NaN where nothing was seen, as a scan in its camera's frame."""
     has = np.isfinite(depth)
     grid = np.full(depth.shape, -1, dtype=np.int64)
     grid[has] = np.arange(has.sum())
