@@ -235,7 +235,7 @@ def simulated(data: Path) -> Iterator[Callable[[], Case]]:
 
 
 def made(name: str, seed: int, turns_deg: tuple[float, ...] | None = None) -> Case:
-    """One of the benchmarks' bodies, as a D435 at 640 x 480 pixels sees it; coarser by few turns."""
+    """One of the benchmarks' bodies, as a D435 sees it; with turns of its own, in fewer pixels."""
     camera = CAMERA
     if turns_deg is None:
         camera = replace(CAMERA, width=640, height=480, fx=600, fy=600, cx=319.5, cy=239.5)

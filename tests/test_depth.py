@@ -225,8 +225,10 @@ def test_layouts_are_known_by_their_files(tmp_path: Path):
     none = DepthOptions()
     assert isinstance(as_named([apc], none), DepthImages)
     assert isinstance(as_named([apc / "frame-000000.depth.png"], none), DepthImages)
-    (apc / "a.xyz").write_text("0 0 0\n")  # then it is a folder of scans as ever
-    assert [file.name for file in collect_named(as_named([apc], none))] == ["a"]
+    plain = capture(tmp_path / "plain", stored(1000), "a.png")
+    assert isinstance(as_named([plain], none), DepthImages)
+    (plain / "a.xyz").write_text("0 0 0\n")  # then it is a folder of scans as ever
+    assert [file.name for file in collect_named(as_named([plain], none))] == ["a"]
 
 
 def bad_sets(folder: Path) -> list[tuple[list[str], str]]:
@@ -243,6 +245,7 @@ def bad_sets(folder: Path) -> list[tuple[list[str], str]]:
     (folder / "cam.txt").write_text(f"{TEXT} 640 480")
     return [
         ([str(alone)], "needs its camera's intrinsics"),
+        ([str(alone.parent)], "needs its camera's intrinsics"),
         ([good, "--intrinsics", str(folder / "none.txt")], "cannot be read"),
         ([good, "--intrinsics", cam], "has 80 x 60 pixels, the intrinsics are for 640 x 480"),
         ([good, "--masks", str(small)], "has 8 x 6 pixels, 000.png 80 x 60"),

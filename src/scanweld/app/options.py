@@ -159,6 +159,10 @@ class DepthOptions:
     masks: Annotated[
         Path | None, typer.Option(help="Folder with a mask for each depth image: the object.")
     ] = None
+    color: Annotated[
+        Path | None,
+        typer.Option(help="Folder with a colour image for each depth image; none for none."),
+    ] = None
 
     def named(self, inputs: list[str]) -> "Sequence[Path | str] | DepthImages":
         """What a user names: files, or depth images."""
@@ -171,6 +175,7 @@ class DepthOptions:
                 scale=self.depth_scale,
                 max_depth=self.depth_max,
                 masks=self.masks,
+                color=self.color,
             ),
         )
 
