@@ -36,7 +36,7 @@ from scanweld.evaluation.metrics import (
     object_diameter,
     scan_centroids,
 )
-from scanweld.evaluation.turntable import CAMERA, TURNS_DEG, turntable
+from scanweld.evaluation.turntable import CAMERA, D435, TURNS_DEG, turntable
 from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
@@ -239,7 +239,9 @@ def made(name: str, seed: int, turns_deg: tuple[float, ...] | None = None) -> Ca
     camera = CAMERA
     if turns_deg is None:
         camera = replace(CAMERA, width=640, height=480, fx=600, fy=600, cx=319.5, cy=239.5)
-    shots = turntable(make_body(name, seed).mesh, turns_deg or TURNS_DEG, camera=camera)
+    shots = turntable(
+        make_body(name, seed).mesh, turns_deg or TURNS_DEG, sensor=D435, camera=camera
+    )
     names = [scan.name for scan in shots.scans]
     return Case(
         subject=f"{name} {seed}",

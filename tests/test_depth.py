@@ -13,7 +13,7 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
-from scanweld.io import read_scan
+from scanweld.io import read_mesh, read_scan
 from scanweld.io.depth.capture import DepthImages, DepthOptions, as_named, collect_named
 from scanweld.io.depth.intrinsics import Intrinsics, read_intrinsics
 from scanweld.io.depth.lens import _through, undistorted
@@ -29,6 +29,7 @@ SIZED = Intrinsics(fx=90.5, fy=91.25, cx=39.5, cy=28.75, width=80, height=60)
 DEPTH = np.rint(4 * bumps(60, 80, 9)) / 1000
 """Metres, whole millimetres."""
 TRUE = scan_of_depth(DEPTH, CAMERA)
+RED = (200, 60, 30)
 TEXT = "90.5 91.25 39.5 28.75"
 
 
@@ -291,11 +292,13 @@ def test_frames_become_a_model_that_is_opened_again(
         depth = np.where(scan.grid >= 0, scan.points[scan.grid, 2] * per_meter, 0)
         put(tmp_path / "depth" / f"{scan.name}.png", np.rint(depth).astype(np.uint16))
         put(tmp_path / "masks" / f"{scan.name}.png", (depth > 0).astype(np.uint8))
+        put(tmp_path / "color" / f"{scan.name}.png", np.full((*depth.shape, 3), RED, np.uint8))
     cam = tmp_path / "depth" / "cam.txt"
     numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
     cam.write_text(" ".join(map(str, numbers)))
     model = tmp_path / "model"
     said = ["--intrinsics", cam, "--masks", tmp_path / "masks", "--depth-scale", 100 * per_meter]
+    said += ["--color", tmp_path / "color"]
     (tmp_path / "a.toml").write_text(COARSE)
     scanweld("run", tmp_path / "depth", *said, "-o", model, "--config", tmp_path / "a.toml")
     true = {name: pose.matrix() for name, pose in scene.world_from_scan.items()}
@@ -303,7 +306,11 @@ def test_frames_become_a_model_that_is_opened_again(
         matrix[:3, 3] /= 100  # in the units of the frames
     (tmp_path / "true.json").write_text(json.dumps({k: m.tolist() for k, m in true.items()}))
     assert scanweld("evaluate", model / "poses.json", tmp_path / "true.json") == 0
-    assert scanweld("report", model) == 0
+    colors = read_mesh(model / "model.ply").colors
+    assert colors is not None and (np.abs(colors - np.array(RED, dtype=float)) < 3).all()
+    before = (model / "report.html").read_text()
+    assert before.count('alt="Colours of') == 3
+    assert scanweld("report", model) == 0 and (model / "report.html").read_text() == before
     moved = (tmp_path / "depth").rename(tmp_path / "moved")
     out = ["--poses", "tum", "--points", "all.ply", "--scans", moved]
     assert scanweld("export", model, "-o", tmp_path / "out", *out) == 0, capsys.readouterr().err

@@ -1,6 +1,6 @@
-"""What was cut off each scan: its depth in grey, with the pixels that were kept in colour."""
+"""Depth frames as pictures: what was cut off them, and the colours that they have."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -18,6 +18,8 @@ GREYS = (235.0, 60.0)
 """Of what is near and of what is far."""
 KEPT = (0.35, 0.8, 0.55)
 """How the grey of pixels that were kept is tinted."""
+COLOR_WIDTH = 160
+"""The same of one of colours, which takes more bytes."""
 NOTHING = (24, 28, 40)
 """Colour of pixels that saw nothing."""
 
@@ -38,6 +40,31 @@ def cut_pictures(
         for name in sorted(reports, key=natural_key)
         if (kept := reports[name].kept) is not None and name in scans
     }
+
+
+def color_pictures(names: Collection[str], scans: Mapping[str, RangeScan]) -> dict[str, Still]:
+    """The colours that depth frames have, as pictures by name.
+
+    Args:
+        names: Of the scans that are shown.
+        scans: As they were read; those without a camera, a grid or colours have no picture.
+    """
+    return {
+        name: still_of(_colors(scans[name]), f"Colours of {name}")
+        for name in sorted(names, key=natural_key)
+        if name in scans and _is_colored(scans[name])
+    }
+
+
+def _is_colored(scan: RangeScan) -> bool:
+    return scan.camera is not None and scan.grid is not None and scan.colors is not None
+
+
+def _colors(scan: RangeScan) -> ByteArray:
+    assert scan.grid is not None and scan.colors is not None
+    step = -(-scan.grid.shape[1] // COLOR_WIDTH)
+    grid = scan.grid[::step, ::step]
+    return np.where((grid >= 0)[..., None], scan.colors[grid], np.array(NOTHING, dtype=np.uint8))
 
 
 def _picture(depth: FloatArray, kept: BoolArray) -> ByteArray:
