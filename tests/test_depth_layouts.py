@@ -71,7 +71,7 @@ def apc(folder: Path) -> None:
         put(folder / f"frame-{k:06d}.depth.png", rotated(stored(10_000)))
         put(folder / f"frame-{k:06d}.color.png", COLORS)
         head = f"# Camera-to-world extrinsic matrix (camera pose) for frame-{k:06d}"
-        told += f"\n{head}\n{rows(pose.matrix())}\n"
+        told += f"\n{head}\n {rows(pose.matrix())}\n"
     text(folder, "cam.info.txt", told)
 
 

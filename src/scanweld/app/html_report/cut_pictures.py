@@ -34,9 +34,7 @@ def cut_pictures(
         scans: As they were read; those that are missing have no picture.
     """
     return {
-        name: still_of(
-            _picture(depth_image(scans[name]), mask_of(kept)), f"What was kept of {name}"
-        )
+        name: depth_picture(scans[name], mask_of(kept), f"What was kept of {name}")
         for name in sorted(reports, key=natural_key)
         if (kept := reports[name].kept) is not None and name in scans
     }
@@ -65,6 +63,12 @@ def _colors(scan: RangeScan) -> ByteArray:
     step = -(-scan.grid.shape[1] // COLOR_WIDTH)
     grid = scan.grid[::step, ::step]
     return np.where((grid >= 0)[..., None], scan.colors[grid], np.array(NOTHING, dtype=np.uint8))
+
+
+def depth_picture(scan: RangeScan, kept: BoolArray | None, alt: str) -> Still:
+    """The depths of a scan with a grid in grey, those of some pixels (H, W) in colour."""
+    depth = depth_image(scan)
+    return still_of(_picture(depth, np.zeros(depth.shape, bool) if kept is None else kept), alt)
 
 
 def _picture(depth: FloatArray, kept: BoolArray) -> ByteArray:

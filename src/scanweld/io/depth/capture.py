@@ -58,10 +58,12 @@ class Frame(ScanFile):
     Attributes:
         settings: How it becomes one.
         world_from_scan: A pose that the layout has for it; nothing is believed of it.
+        layout: What the layout is called, if it is a known one.
     """
 
     settings: FrameSettings
     world_from_scan: Pose | None = None
+    layout: str = ""
 
     def read(self) -> RangeScan:
         """Read the scan.
@@ -111,6 +113,7 @@ class DepthImages:
                 path=shot.depth,
                 name=printable(name),
                 world_from_scan=shot.world_from_camera,
+                layout="" if found.layout is None else found.layout.name,
                 settings=FrameSettings(
                     intrinsics=intrinsics[shot.depth],
                     scale=scales[shot.depth],

@@ -10,7 +10,7 @@ from pathlib import Path
 from scanweld.io.depth.layouts.records import Layout, Shot, images_in, pose_or_none
 from scanweld.io.poses import read_text
 
-_POSE = re.compile(r"camera pose\) for (\S+)\s*\n((?:[-+.\deE]+\s+){15}[-+.\deE]+)")
+_POSE = re.compile(r"camera pose\) for (\S+)\s*\n\s*((?:[-+.\deE]+\s+){15}[-+.\deE]+)")
 
 
 def recognise(folder: Path) -> bool:
