@@ -145,7 +145,10 @@ def measured(case: Case, workers: int) -> Json:
         "confidence": [min(sure), max(sure)] if sure else [],
         **largest(errors, [name for name in placed if name not in wrong]),
         "left_out": dict(result.unplaced),
-        "wrong_scans": wrong,
+        "wrong_scans": {
+            name: [errors.scans[name].rotation_deg, errors.scans[name].translation]
+            for name in wrong
+        },
         "cpu_seconds": seconds,
         "reasons": list(result.reasons),
     }

@@ -7,7 +7,7 @@ import numpy as np
 from scanweld.app.html_report.stills import Still, still_of
 from scanweld.cut import mask_of
 from scanweld.cut.frames import depth_image
-from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
+from scanweld.geometry.arrays import BoolArray, ByteArray
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanReport
@@ -67,11 +67,13 @@ def _colors(scan: RangeScan) -> ByteArray:
 
 def depth_picture(scan: RangeScan, kept: BoolArray | None, alt: str) -> Still:
     """The depths of a scan with a grid in grey, those of some pixels (H, W) in colour."""
+    return still_of(picture_of(scan, kept), alt)
+
+
+def picture_of(scan: RangeScan, kept: BoolArray | None = None) -> ByteArray:
+    """The same as pixels (h, w, 3)."""
     depth = depth_image(scan)
-    return still_of(_picture(depth, np.zeros(depth.shape, bool) if kept is None else kept), alt)
-
-
-def _picture(depth: FloatArray, kept: BoolArray) -> ByteArray:
+    kept = np.zeros(depth.shape, dtype=bool) if kept is None else kept
     step = -(-depth.shape[1] // WIDTH)
     depth, kept = depth[::step, ::step], kept[::step, ::step]
     has = np.isfinite(depth)
