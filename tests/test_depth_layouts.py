@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from scanweld.app import job
 from scanweld.errors import InputError, ReadError, ScanweldError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.depth.capture import DepthImages, DepthOptions, as_named
 from scanweld.io.depth.layouts.registry import layout_rows, layouts_markdown
+from scanweld.io.poses import PoseSet
+from scanweld.knowledge.facts import Knowledge
 from tests.command_line import error_line, scanweld
 from tests.scenes import random_motion
 from tests.test_depth import CAMERA, DEPTH, TEXT, TRUE, matrix, put, rotated, stored
@@ -218,6 +221,37 @@ def test_broken_poses_are_none_and_said(tmp_path: Path):
     text(tmp_path, "o/trajectory.log", f"0 0 1\n{rows(np.eye(4))}")
     scans = scans_of(tmp_path / "o")
     assert all("not one pose for each" in " ".join(scan.notes) for scan in scans)
+
+
+def test_the_poses_of_a_layout_are_tried_and_what_came_of_them_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    told: list[Knowledge] = []
+
+    def run(scans: list[RangeScan], *_: object, knowledge: Knowledge, **more: object) -> object:
+        told.append(knowledge)
+        raise InputError("enough")
+
+    monkeypatch.setattr(job.pipeline, "run", run)
+    apc(tmp_path / "apc")
+    given = PoseSet(poses={"frame-000000": POSES[1]}, components=(("frame-000000",),))
+    for known in (None, Knowledge(turntable=True), Knowledge(start=given)):
+        with pytest.raises(InputError, match="enough"):
+            images = DepthImages(inputs=[tmp_path / "apc"])
+            job.run_job(images, tmp_path / "out", knowledge=known)
+    starts = [each.start for each in told]
+    assert starts[2] is given and told[1].turntable
+    for start in starts[:2]:
+        assert start is not None and start.components == (("frame-000000", "frame-000001"),)
+        np.testing.assert_allclose(start.poses["frame-000001"].matrix(), POSES[1].matrix())
+
+
+def test_poses_that_are_all_the_same_are_not_used(tmp_path: Path):
+    seven_scenes(tmp_path)
+    for k in range(2):
+        text(tmp_path, f"frame-{k:06d}.pose.txt", rows(POSES[0].matrix()))
+    for scan in scans_of(tmp_path):
+        assert scan.world_from_scan is None and "all poses of the capture" in " ".join(scan.notes)
 
 
 def test_usual_cameras_are_taken_where_no_file_has_one(tmp_path: Path):

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scanweld.app.cache import FileCache, cache_folder
@@ -17,7 +17,7 @@ from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, path_from, printable
-from scanweld.io.depth.capture import DepthImages, collect_named
+from scanweld.io.depth.capture import DepthImages, collect_named, start_poses
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline import run as pipeline
 from scanweld.preparation.thinning import thinned
@@ -77,6 +77,9 @@ def run_job(
             no such cluster. Files that cannot be read are named in the result instead.
     """
     files, workers, memory = collect_named(inputs), limits.workers, limits.memory
+    known = knowledge or Knowledge()
+    if known.start is None:
+        known = replace(known, start=start_poses(files))
     paths = [file.path for file in files]
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
@@ -91,7 +94,7 @@ def run_job(
         result = pipeline.run(
             scans,
             config or Config(),
-            knowledge=knowledge,
+            knowledge=known,
             unreadable=unreadable,
             workers=runner or workers,
             cache=cache,

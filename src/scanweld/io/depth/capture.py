@@ -26,6 +26,7 @@ from scanweld.io.depth.layouts.shots import Shots, shots_of
 from scanweld.io.depth.pixels import read_pixels
 from scanweld.io.depth.scale import DepthScale, find_scale
 from scanweld.io.names import printable
+from scanweld.io.poses import PoseSet
 
 _MOST_LOOKED_AT = 20
 """Images, evenly spread over a set, from which its scale is found."""
@@ -210,6 +211,13 @@ def as_named(inputs: Inputs, options: DepthOptions) -> Inputs | DepthImages:
             )
         return images
     return images if are_depth_images(inputs) else inputs
+
+
+def start_poses(files: Sequence[ScanFile]) -> PoseSet | None:
+    """The poses that the layout of a capture has, to be tried; None if it has none."""
+    frames = [file for file in files if isinstance(file, Frame)]
+    poses = {f.name: f.world_from_scan for f in frames if f.world_from_scan is not None}
+    return PoseSet(poses=poses, components=(tuple(poses),)) if len(poses) > 1 else None
 
 
 def collect_named(named: Inputs | DepthImages) -> tuple[ScanFile, ...]:

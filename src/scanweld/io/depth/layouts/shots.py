@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scanweld.errors import InputError
@@ -103,4 +103,13 @@ def _read(folder: Path) -> Shots | None:
     layout = layout_of(folder)
     if layout is None:
         return None
-    return Shots(shots=tuple(layout.read(folder)), layout=layout, folder=folder)
+    return Shots(shots=_without_one_pose(layout.read(folder)), layout=layout, folder=folder)
+
+
+def _without_one_pose(shots: Sequence[Shot]) -> tuple[Shot, ...]:
+    """The images without their poses, if all are the same: a camera that stood tells nothing."""
+    poses = [s.world_from_camera.matrix() for s in shots if s.world_from_camera is not None]
+    if len(poses) < 2 or any((pose != poses[0]).any() for pose in poses):
+        return tuple(shots)
+    note = "all poses of the capture are the same: they are not used"
+    return tuple(replace(s, world_from_camera=None, notes=(*s.notes, note)) for s in shots)
