@@ -24,7 +24,7 @@ import numpy as np
 
 from benchmarks.blocks import rendered
 from benchmarks.kept import warn_of_old_calibration
-from benchmarks.results import Json, write_results
+from benchmarks.results import Json, commit, read_results, write_results
 from benchmarks.sets import data_folder
 from benchmarks.virtual.bodies import make_body
 from scanweld.cut import mask_of
@@ -92,16 +92,23 @@ def main() -> int:
     add("--out", type=Path, help="JSON file of all records")
     options = parser.parse_args()
     warn_of_old_calibration()
-    records: list[Json] = []
+    chosen = ["simulated"] if options.quick else options.kinds
+    records = [r for r in kept_records(options.out) if r["kind"] not in chosen]
     for make in cases(options, kinds):
         case = make()
         records.append(measured(case, options.workers))
         told = ", ".join(f"{records[-1][key]} {key}" for key in ("right", "wrong", "unplaced"))
         print(f"{case.subject}: {records[-1]['verdict']}, {told}", file=sys.stderr, flush=True)
         if options.out:
+            records.sort(key=lambda record: list(kinds).index(record["kind"]))
             write_results(options.out, records)
     print(rendered("depth", **by_kind(records)), end="")
     return 0
+
+
+def kept_records(path: Path | None) -> list[Json]:
+    """What was measured before: a command may measure some of the kinds anew."""
+    return read_results(path)["records"] if path is not None and path.is_file() else []
 
 
 def cases(
@@ -151,6 +158,7 @@ def measured(case: Case, workers: int) -> Json:
         },
         "cpu_seconds": seconds,
         "reasons": list(result.reasons),
+        "commit": commit(),
     }
 
 
