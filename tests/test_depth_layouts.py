@@ -218,6 +218,7 @@ def test_broken_poses_are_none_and_said(tmp_path: Path):
     assert first.world_from_scan is None and "without a pose" in " ".join(first.notes)
     assert second.world_from_scan is not None
     open3d(tmp_path / "o")
+    text(tmp_path, "o/metadata.json", {"device": "of no other layout"})
     text(tmp_path, "o/trajectory.log", f"0 0 1\n{rows(np.eye(4))}")
     scans = scans_of(tmp_path / "o")
     assert all("not one pose for each" in " ".join(scan.notes) for scan in scans)

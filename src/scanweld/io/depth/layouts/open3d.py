@@ -6,6 +6,7 @@
 from pathlib import Path
 
 from scanweld.io.depth.images import by_name
+from scanweld.io.depth.layouts import bop, record3d, tum
 from scanweld.io.depth.layouts.records import (
     Layout,
     Shot,
@@ -16,17 +17,16 @@ from scanweld.io.depth.layouts.records import (
 from scanweld.io.depth.pixels import COLOR_SUFFIXES, SUFFIXES
 
 _CAMERAS = ("camera_intrinsic.json", "intrinsic.json", "intrinsics.json")
-_OTHERS = ("depth.txt", "scene_camera.json", "metadata.json", "metadata")
-"""Files of layouts that have a folder ``depth`` too, and may have been given a camera."""
 _POSES = ("trajectory.log", "scene/trajectory.log")
 _COLORS = ("color", "image", "rgb")
 
 
 def recognise(folder: Path) -> bool:
     """Whether a folder has this layout."""
-    has = lambda name: (folder / name).is_file()  # noqa: E731
-    is_meant = (folder / "depth").is_dir() and any(map(has, _CAMERAS))
-    return is_meant and not any(map(has, _OTHERS))
+    has_camera = any((folder / name).is_file() for name in _CAMERAS)
+    # Others have a folder depth too, and may have been given a camera.
+    is_another = any(other.recognise(folder) for other in (bop, record3d, tum))
+    return (folder / "depth").is_dir() and has_camera and not is_another
 
 
 def read(folder: Path) -> list[Shot]:
