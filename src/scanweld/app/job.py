@@ -77,9 +77,7 @@ def run_job(
             no such cluster. Files that cannot be read are named in the result instead.
     """
     files, workers, memory = collect_named(inputs), limits.workers, limits.memory
-    known = knowledge or Knowledge()
-    if known.start is None:
-        known = replace(known, start=start_poses(files))
+    known = _with_layout_poses(knowledge or Knowledge(), files)
     paths = [file.path for file in files]
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
@@ -109,6 +107,11 @@ def run_job(
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
     return result
+
+
+def _with_layout_poses(known: Knowledge, files: Sequence[ScanFile]) -> Knowledge:
+    """What is known, with the poses that a capture has as starts if no others are given."""
+    return known if known.start is not None else replace(known, start=start_poses(files))
 
 
 def _runner(scheduler: str | None) -> AbstractContextManager[Runner | None]:
