@@ -15,6 +15,7 @@ from scanweld.io.depth.intrinsics import Intrinsics
 from scanweld.io.depth.layouts.records import Layout, Shot, images_in
 from scanweld.io.depth.pixels import SUFFIXES
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion
+from scanweld.io.pose_formats.records import are_numbers
 from scanweld.io.poses import read_text
 
 _APART = 0.02
@@ -28,14 +29,14 @@ def recognise(folder: Path) -> bool:
 
 def read(folder: Path) -> list[Shot]:
     """The depth images that are there, with the colour and the pose nearest in time."""
-    when = {Path(words[1]).name: time for time, words in _rows(folder / "depth.txt", 2)}
-    colors = _rows(folder / "rgb.txt", 2)
-    poses = _rows(folder / "groundtruth.txt", 8)
+    when = {Path(words[1]).name: float(words[0]) for words in _rows(folder / "depth.txt", 2)}
+    colors = _Timed(_rows(folder / "rgb.txt", 2))
+    poses = _Timed(_rows(folder / "groundtruth.txt", 8))
     shots = []
     for image in images_in(folder / "depth", *SUFFIXES):
         time = when.get(image.name)
-        color = None if time is None else _nearest(time, colors)
-        pose = None if time is None else _nearest(time, poses)
+        color = None if time is None else colors.nearest(time)
+        pose = None if time is None else poses.nearest(time)
         shots.append(
             Shot(
                 depth=image,
@@ -47,29 +48,30 @@ def read(folder: Path) -> list[Shot]:
     return shots
 
 
-def _rows(path: Path, count: int) -> list[tuple[float, list[str]]]:
-    """Time and words of each line of a list, ordered by time; none if there is no such file."""
-    if not path.is_file():
-        return []
+class _Timed:
+    """Lines of a list, to be found by their time."""
+
+    def __init__(self, rows: Sequence[Sequence[str]]) -> None:
+        self._rows = rows
+        self._times = np.array([float(words[0]) for words in rows])
+
+    def nearest(self, time: float) -> Sequence[str] | None:
+        """The words of the line of a time, if there is one."""
+        apart = np.abs(self._times - time)
+        return self._rows[int(np.nanargmin(apart))] if (apart <= _APART).any() else None
+
+
+def _rows(path: Path, count: int) -> list[list[str]]:
+    """The words of each line of a list, the first of which is a time; none if there is no file."""
     rows = []
-    for k, line in enumerate(read_text(path).splitlines(), start=1):
+    for k, line in enumerate(read_text(path).splitlines() if path.is_file() else (), start=1):
         words = line.split("#")[0].split()
         if not words:
             continue
-        try:
-            rows.append((float(words[0]), words))
-        except ValueError as error:
-            raise ReadError(f"{path}: line {k}: {error}; correct it") from error
-        if len(words) != count:
-            raise ReadError(f"{path}: line {k}: {len(words)} words, not {count}; correct it")
-    return sorted(rows)
-
-
-def _nearest(time: float, rows: Sequence[tuple[float, list[str]]]) -> list[str] | None:
-    times = np.array([each for each, _ in rows])
-    if not len(times) or np.abs(times - time).min() > _APART:
-        return None
-    return rows[int(np.argmin(np.abs(times - time)))][1]
+        if len(words) != count or not are_numbers(words[:1]):
+            raise ReadError(f"{path}: line {k}: not a time and {count - 1} more words; correct it")
+        rows.append(words)
+    return rows
 
 
 def _pose(folder: Path, words: Sequence[str]) -> Pose | None:
