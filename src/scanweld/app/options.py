@@ -157,7 +157,8 @@ class DepthOptions:
         float | None, typer.Option(min=0.0, help="Metres beyond which depths are left out.")
     ] = None
     masks: Annotated[
-        Path | None, typer.Option(help="Folder with a mask for each depth image: the object.")
+        Path | None,
+        typer.Option(help="Folder with a mask for each depth image, or a pattern: the object."),
     ] = None
     color: Annotated[
         Path | None,
