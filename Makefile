@@ -31,8 +31,8 @@ lint: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-docs
 	$(BIN)/mkdocs build --strict
 
-# The numbers of README.md, docs/benchmarks.md and docs/model.md; needs the Stanford data, takes a
-# quarter of an hour. Small and without the data: make benchmarks BENCHMARKS="--quick --out bench"
+# The numbers of README.md, docs/benchmarks.md, model.md and depth.md; needs the data, takes half an
+# hour. Small and without the data: make benchmarks BENCHMARKS="--quick --out bench"
 benchmarks: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks $(BENCHMARKS)
 

@@ -1,6 +1,6 @@
-"""Measure all tables of README.md, docs/benchmarks.md and docs/model.md, and write these pages.
+"""Measure all tables of README.md, of benchmarks, model and depth in docs, and write these pages.
 
-python -m benchmarks                     needs the Stanford data and a quarter of an hour
+python -m benchmarks                     needs the data and half an hour
 python -m benchmarks --quick --out DIR   small, without the data; the pages stay as they are
 """
 
@@ -17,6 +17,7 @@ COMMANDS = {
     "pairs": ("pairs", "--seeds 3 --keypoints heat even mixed --plot docs/pairs.png"),
     "keypoints": ("keypoints", ""),
     "model": ("model", ""),
+    "depth": ("depth", ""),
 }
 """Module -> its results, and options of the full measurement."""
 

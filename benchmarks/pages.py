@@ -10,11 +10,14 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks import blocks, fuzz, keypoints, model, pairs, reading, run
+from benchmarks import blocks, depth, fuzz, keypoints, model, pairs, reading, run
 from benchmarks.results import DATA, DOCS, ROOT, Json, how_measured, read_results, write_file
 from scanweld.io.scan_formats.registry import formats_markdown
 
-PAGES = (ROOT / "README.md", *(DOCS / f"{name}.md" for name in ("benchmarks", "model", "formats")))
+PAGES = (
+    ROOT / "README.md",
+    *(DOCS / f"{name}.md" for name in ("benchmarks", "model", "formats", "depth")),
+)
 USAGE_ERROR = 2
 TABLE_OF_FORMATS = "scan-formats"
 """The one part that is not measured."""
@@ -25,6 +28,7 @@ BLOCKS: dict[str, tuple[str, Callable[[Sequence[Json]], Json]]] = {
     **dict.fromkeys(("model", "model-rivals", "model-many"), ("model", model.by_kind)),
     "fuzz": ("fuzz", fuzz.by_format),
     "reading": ("reading", reading.over_files),
+    "depth": ("depth", depth.by_kind),
 }
 """Part of a page, and its template -> its results in docs/data, and what sums these up for it."""
 

@@ -9,18 +9,11 @@ import pytest
 from scanweld.cut import CutSet, cut_out, mask_of, mask_text, with_only
 from scanweld.errors import InputError
 from scanweld.evaluation.primitives import box, cylinder
+from scanweld.evaluation.turntable import EXACT, Shots, standing_room, turntable
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
 from tests.scenes import random_motion, small_creature
-from tests.turntables import (
-    EXACT,
-    OBJECTS,
-    SYMMETRIC,
-    Shots,
-    iou,
-    standing_room,
-    turntable,
-)
+from tests.turntables import OBJECTS, SYMMETRIC, iou
 
 FIVE_TURNS = (0.0, 38.0, 95.0, 187.0, 275.0)
 

@@ -6,18 +6,19 @@ from pathlib import Path
 import pytest
 
 from scanweld.cut import mask_of
+from scanweld.evaluation.turntable import DepthSensor, Shots, turntable
 from scanweld.io import read_scan, write_scan_ply
 from tests.command_line import COARSE, error_line, scanweld
 from tests.html_pages import Page
 from tests.scenes import small_creature
-from tests.turntables import Sensor, Shots, iou, turntable
+from tests.turntables import iou
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def made() -> Shots:
-    return turntable(small_creature(), (0.0, 25.0, 50.0), sensor=Sensor(wave=0.002, eaten=1.0))
+    return turntable(small_creature(), (0.0, 25.0, 50.0), sensor=DepthSensor(wave=0.002, eaten=1.0))
 
 
 @pytest.fixture(scope="module")

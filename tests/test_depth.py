@@ -13,7 +13,7 @@ from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.scan import RangeScan, Viewpoint
-from scanweld.io import read_scan
+from scanweld.io import read_mesh, read_scan
 from scanweld.io.depth.capture import DepthImages, DepthOptions, as_named, collect_named
 from scanweld.io.depth.intrinsics import Intrinsics, read_intrinsics
 from scanweld.io.depth.lens import _through, undistorted
@@ -29,6 +29,7 @@ SIZED = Intrinsics(fx=90.5, fy=91.25, cx=39.5, cy=28.75, width=80, height=60)
 DEPTH = np.rint(4 * bumps(60, 80, 9)) / 1000
 """Metres, whole millimetres."""
 TRUE = scan_of_depth(DEPTH, CAMERA)
+RED = (200, 60, 30)
 TEXT = "90.5 91.25 39.5 28.75"
 
 
@@ -226,8 +227,10 @@ def test_layouts_are_known_by_their_files(tmp_path: Path):
     none = DepthOptions()
     assert isinstance(as_named([apc], none), DepthImages)
     assert isinstance(as_named([apc / "frame-000000.depth.png"], none), DepthImages)
-    (apc / "a.xyz").write_text("0 0 0\n")  # then it is a folder of scans as ever
-    assert [file.name for file in collect_named(as_named([apc], none))] == ["a"]
+    plain = capture(tmp_path / "plain", stored(1000), "a.png")
+    assert isinstance(as_named([plain], none), DepthImages)
+    (plain / "a.xyz").write_text("0 0 0\n")  # then it is a folder of scans as ever
+    assert [file.name for file in collect_named(as_named([plain], none))] == ["a"]
 
 
 def bad_sets(folder: Path) -> list[tuple[list[str], str]]:
@@ -244,6 +247,7 @@ def bad_sets(folder: Path) -> list[tuple[list[str], str]]:
     (folder / "cam.txt").write_text(f"{TEXT} 640 480")
     return [
         ([str(alone)], "needs its camera's intrinsics"),
+        ([str(alone.parent)], "needs its camera's intrinsics"),
         ([good, "--intrinsics", str(folder / "none.txt")], "cannot be read"),
         ([good, "--intrinsics", cam], "has 80 x 60 pixels, the intrinsics are for 640 x 480"),
         ([good, "--masks", str(small)], "has 8 x 6 pixels, 000.png 80 x 60"),
@@ -289,11 +293,13 @@ def test_frames_become_a_model_that_is_opened_again(
         depth = np.where(scan.grid >= 0, scan.points[scan.grid, 2] * per_meter, 0)
         put(tmp_path / "depth" / f"{scan.name}.png", np.rint(depth).astype(np.uint16))
         put(tmp_path / "masks" / f"{scan.name}.png", (depth > 0).astype(np.uint8))
+        put(tmp_path / "color" / f"{scan.name}.png", np.full((*depth.shape, 3), RED, np.uint8))
     cam = tmp_path / "depth" / "cam.txt"
     numbers = (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height)
     cam.write_text(" ".join(map(str, numbers)))
     model = tmp_path / "model"
     said = ["--intrinsics", cam, "--masks", tmp_path / "masks", "--depth-scale", 100 * per_meter]
+    said += ["--color", tmp_path / "color"]
     (tmp_path / "a.toml").write_text(COARSE)
     scanweld("run", tmp_path / "depth", *said, "-o", model, "--config", tmp_path / "a.toml")
     true = {name: pose.matrix() for name, pose in scene.world_from_scan.items()}
@@ -301,7 +307,11 @@ def test_frames_become_a_model_that_is_opened_again(
         matrix[:3, 3] /= 100  # in the units of the frames
     (tmp_path / "true.json").write_text(json.dumps({k: m.tolist() for k, m in true.items()}))
     assert scanweld("evaluate", model / "poses.json", tmp_path / "true.json") == 0
-    assert scanweld("report", model) == 0
+    colors = read_mesh(model / "model.ply").colors
+    assert colors is not None and (np.abs(colors - np.array(RED, dtype=float)) < 3).all()
+    before = (model / "report.html").read_text()
+    assert before.count('alt="Colours of') == 3
+    assert scanweld("report", model) == 0 and (model / "report.html").read_text() == before
     moved = (tmp_path / "depth").rename(tmp_path / "moved")
     out = ["--poses", "tum", "--points", "all.ply", "--scans", moved]
     assert scanweld("export", model, "-o", tmp_path / "out", *out) == 0, capsys.readouterr().err

@@ -33,12 +33,21 @@ SAYS = {
     ),
     "05_fuse_known_poses.py": (r"\b([5-9]\d{3}|\d{5,}) faces",),
     "06_evaluate.py": ("of 5 scans: 3 right, 1 wrong, 1 unplaced",),
+    "07_depth_frames.py": (
+        r"\A\w+: 4 of 4 frames are placed",
+        r"(?s)(^00\d: cut: table and background.*){4}",
+        r"(?s)(^00\d by its mask: \d{4,5} points.*){4}",
+    ),
+    "08_capture.py": (r"^001: with colours", r"Open3D layout, with a pose \(trajectory\.log\)"),
 }
 
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=SLOW if name[:2] in ("00", "03", "04") else ()) for name in SAYS],
+    [
+        pytest.param(name, marks=SLOW if name[:2] in ("00", "03", "04", "07") else ())
+        for name in SAYS
+    ],
 )
 def test_examples_do_what_they_say(name: str, capsys: pytest.CaptureFixture[str]):
     runpy.run_path(str(EXAMPLES / name), run_name="__main__")

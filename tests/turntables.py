@@ -1,54 +1,13 @@
-"""Whole depth frames of an object that is turned on a table before a standing camera."""
+"""Objects that are turned before a depth camera, and how well they are cut out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-
-import numpy as np
-from scipy import ndimage
 
 from scanweld.evaluation.primitives import box, cylinder, lathe, sphere
-from scanweld.geometry.arrays import BoolArray, FloatArray
-from scanweld.geometry.camera import Camera, CameraModel
+from scanweld.evaluation.turntable import joined, moved
+from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.mesh import TriangleMesh
-from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.geometry.rasterize import render_depth
-from scanweld.geometry.scan import RangeScan
 from tests.bodies import gear, vase, worn
-from tests.depth_scans import scan_of_depth
-from tests.meshes import joined
 from tests.scenes import small_creature
-
-CAMERA = Camera(
-    model=CameraModel.PINHOLE, width=320, height=240, fx=300, fy=300, cx=159.5, cy=119.5
-)
-TURNS_DEG = (0.0, 38.0, 95.0, 131.0, 187.0, 222.0, 275.0, 318.0)
-DISTANCE, ELEVATION_DEG = 0.5, 30.0
-SIZE = 0.16
-"""Largest extent of the objects, in metres, as all lengths here."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Sensor:
-    """What a depth camera does: D435-like by default.
-
-    Attributes:
-        local: Noise from pixel to pixel at 0.4 m; it grows with the square of the depth.
-        quantum: Step of the depth.
-        wave: Error that is alike over some 8 cm, as a share of the depth, another in each frame.
-        eaten: Pixels along jumps without return, at most.
-        baseline: Of a stereo pair: what only one of its cameras sees has no return.
-        lost: Share of the pixels without return.
-    """
-
-    local: float = 4e-4
-    quantum: float = 1e-3
-    wave: float = 0.01
-    eaten: float = 2.0
-    baseline: float = 0.03
-    lost: float = 0.03
-
-
-EXACT = Sensor(local=0.0, quantum=0.0, wave=0.0, eaten=0.0, baseline=0.0, lost=0.0)
 
 OBJECTS: dict[str, Callable[[], TriangleMesh]] = {
     **{f"creature {k}": lambda k=k: small_creature(k) for k in range(4)},
@@ -64,111 +23,6 @@ OBJECTS: dict[str, Callable[[], TriangleMesh]] = {
     "gear and box": lambda: joined(lathe(gear, 30.0), moved(box(20, 30, 70), (20, 0, 20))),
 }
 SYMMETRIC = lambda: lathe(vase, 100.0)  # noqa: E731
-
-
-def moved(mesh: TriangleMesh, shift: tuple[float, float, float]) -> TriangleMesh:
-    return replace(mesh, vertices=mesh.vertices + np.array(shift))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Shots:
-    """Frames, and which pixels (H, W) of each show the object."""
-
-    scans: tuple[RangeScan, ...]
-    masks: tuple[BoolArray, ...]
-
-
-def turntable(
-    mesh: TriangleMesh,
-    turns_deg: tuple[float, ...] = TURNS_DEG,
-    *,
-    sensor: Sensor | None = None,
-    camera: Camera = CAMERA,
-    room: TriangleMesh | None = None,
-    camera_turns_deg: float = 0.0,
-    size: float = SIZE,
-) -> Shots:
-    """Render an object on a table, before a wall, at several turns of the object.
-
-    Args:
-        mesh: The object, of any size, z upwards.
-        turns_deg: Of the object about the vertical.
-        sensor: What it does to depth.
-        camera: Its intrinsics.
-        room: What stands still; the table, a wall and a box if not given.
-        camera_turns_deg: How far the camera goes around from one frame to the next.
-        size: Largest extent of the object.
-    """
-    sensor, room = sensor or Sensor(), room or standing_room()
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    middle = np.append((low + high)[:2] / 2, low[2])
-    body = (mesh.vertices - middle) * (size / (high - low).max())
-    scans, masks = [], []
-    for k, turn in enumerate(turns_deg):
-        around = rotation_exp(np.radians([0.0, 0.0, turn]))
-        sensor_from_world = _camera_pose(camera_turns_deg * k).inverse()
-        scene = joined(replace(mesh, vertices=body @ around.T, normals=None, colors=None), room)
-        points = sensor_from_world.apply(scene.vertices)
-        depth, face_of = render_depth(points, scene.faces, camera)
-        is_object = (face_of >= 0) & (face_of < len(mesh.faces))
-        measured = disturbed(depth, is_object, camera, sensor, np.random.default_rng(k + 7))
-        scans.append(replace(scan_of_depth(measured, camera), name=f"{k:03d}"))
-        masks.append(is_object & np.isfinite(measured))
-    return Shots(scans=tuple(scans), masks=tuple(masks))
-
-
-def standing_room(disc: float = 0.0) -> TriangleMesh:
-    """A table, a wall behind it, a box on it, and a disc under the object if it has a height."""
-    table = moved(box(1.0, 1.1, 0.02), (-0.22, 0.0, -0.01 - disc))
-    wall = moved(box(0.02, 3.0, 2.0), (-0.75, 0.0, 0.0))
-    clutter = moved(box(0.08, 0.06, 0.1), (-0.2, 0.17, 0.05 - disc))
-    flat = cylinder(0.1, disc) if disc else box(0.01, 0.01, 0.01)
-    return joined(table, wall, clutter, moved(flat, (0.0, 0.0, -max(disc, 0.01) / 2 - 1e-4)))
-
-
-def _camera_pose(azimuth_deg: float) -> Pose:
-    """world_from_sensor: looks at a point above the table's middle, slightly from above."""
-    a, e = np.radians([azimuth_deg, ELEVATION_DEG])
-    back = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    right = np.array([-np.sin(a), np.cos(a), 0.0])
-    rotation = np.stack([right, np.cross(-back, right), -back], axis=1)
-    return Pose(rotation=rotation, translation=np.array([0, 0, 0.05]) + DISTANCE * back)
-
-
-def disturbed(
-    depth: FloatArray,
-    is_object: BoolArray,
-    camera: Camera,
-    sensor: Sensor,
-    rng: np.random.Generator,
-) -> FloatArray:
-    """Depth (H, W) as a sensor gives it, NaN without return."""
-    seen = np.isfinite(depth)
-    points = camera.unproject_image(np.where(seen, depth, 1.0))
-    ways = rng.normal(size=(12, 3))
-    ways *= 2 * np.pi / 0.08 / rng.uniform(1, 2, (12, 1)) / np.linalg.norm(ways, axis=1)[:, None]
-    waves = np.sin(points @ ways.T + rng.uniform(0, 2 * np.pi, 12)).sum(axis=-1) / np.sqrt(6)
-    noise = sensor.local * (depth / 0.4) ** 2 * rng.normal(size=depth.shape)
-    measured = depth * (1 + sensor.wave * waves) + noise
-    if sensor.quantum:
-        measured = sensor.quantum * np.round(measured / sensor.quantum)
-    near = ndimage.minimum_filter(np.where(seen, depth, np.inf), 3)
-    is_jump = seen & (depth > near * 1.03)
-    width = sensor.eaten * _smooth(depth.shape, 8.0, rng)
-    lost = np.asarray(ndimage.distance_transform_edt(~is_jump)) < width
-    lost |= rng.random(depth.shape) < sensor.lost * _smooth(depth.shape, 3.0, rng) * 2
-    if sensor.eaten:  # a dark part of the object
-        lost |= is_object & (_smooth(depth.shape, 8.0, rng) > 0.97)
-    columns = np.arange(depth.shape[1]) - camera.fx * sensor.baseline / depth
-    columns = np.where(seen, columns, np.inf)
-    lost |= columns > np.minimum.accumulate(columns[:, ::-1], axis=1)[:, ::-1]
-    return np.where(seen & ~lost, measured, np.nan)
-
-
-def _smooth(shape: tuple[int, ...], width: float, rng: np.random.Generator) -> FloatArray:
-    """Shares from 0 to 1 that change over so many pixels."""
-    field = ndimage.gaussian_filter(rng.normal(size=shape), width)
-    return np.argsort(np.argsort(field, axis=None)).reshape(shape) / field.size
 
 
 def iou(a: BoolArray, b: BoolArray) -> float:

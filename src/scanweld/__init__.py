@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         write_poses,
         write_scan_ply,
     )
+    from scanweld.io.depth.capture import DepthOptions
     from scanweld.io.scans import read_scans
     from scanweld.knowledge.facts import Knowledge, read_knowledge
     from scanweld.pairs.result import PairKind
@@ -66,6 +67,7 @@ __all__ = [
     "CameraModel",
     "Config",
     "ConfigError",
+    "DepthOptions",
     "Event",
     "Evidence",
     "FactReport",
@@ -128,6 +130,7 @@ _MODULES = {
     "geometry.prepared": "PreparedScan",
     "geometry.scan": "RangeScan Viewpoint",
     "io": "PoseSet read_mesh read_poses read_scan write_mesh_ply write_poses write_scan_ply",
+    "io.depth.capture": "DepthOptions",
     "io.scans": "read_scans",
     "knowledge.facts": "Knowledge read_knowledge",
     "pairs.result": "PairKind",

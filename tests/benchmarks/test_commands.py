@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import kept, keypoints, model, pairs, run, trust
+from benchmarks import depth, kept, keypoints, model, pairs, run, trust
 from benchmarks.blocks import rendered
 from benchmarks.calibration import __main__ as calibration
 from benchmarks.compare import difference
@@ -55,6 +55,14 @@ def test_pairs_run_quickly(command: Command, tmp_path: Path, capsys: pytest.Capt
     assert len(answers) == 3 and sum(a["rank"] == 1 for a in answers) >= 2 and plot.exists()
     assert not any(a["kind"] == "good" and a["rank"] != 1 for a in answers)
     assert "| mixed | 0.15-1.00 |" in capsys.readouterr().out
+
+
+def test_depth_runs_quickly(command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    out = tmp_path / "depth.json"
+    assert command(depth, "--quick", "--workers", 1, "--out", out) == 0
+    (record,) = read_results(out)["records"]
+    assert record["scans"] == 3 and record["good_and_wrong"] == 0 and record["iou"][0] > 0.93
+    assert "| thing 0 | 3 |" in capsys.readouterr().out
 
 
 def test_keypoints_run_quickly(command: Command, capsys: pytest.CaptureFixture[str]):

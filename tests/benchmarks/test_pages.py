@@ -19,7 +19,9 @@ DOCS = ROOT / "docs"
 PAPER = DOCS / "paper"
 
 
-@pytest.mark.parametrize("name", ["../README.md", "benchmarks.md", "model.md", "formats.md"])
+@pytest.mark.parametrize(
+    "name", ["../README.md", "benchmarks.md", "model.md", "formats.md", "depth.md"]
+)
 def test_measured_parts_are_those_of_the_results(name: str):
     text = (DOCS / name).read_text(encoding="utf-8")
     assert BLOCK.findall(text)

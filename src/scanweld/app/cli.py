@@ -13,7 +13,7 @@ from scanweld.app import cache_commands
 from scanweld.app.model_commands import export, fuse, report, run
 from scanweld.app.named_pairs import with_pairs_joined
 from scanweld.app.options import DepthOptions, takes, without_collecting
-from scanweld.errors import BudgetError, ExitCode, KnowledgeError, ScanweldError
+from scanweld.errors import BudgetError, ExitCode, InputError, KnowledgeError, ScanweldError
 
 # What only one command needs is imported inside it: help and small commands then start at once.
 
@@ -35,6 +35,9 @@ class InfoOptions:
         list[str], typer.Argument(metavar="FILES...", help="Scan files, folders or glob patterns.")
     ]
     depth: DepthOptions
+    html: Annotated[
+        Path | None, typer.Option(help="Write a page with pictures of depth frames to this file.")
+    ] = None
 
 
 @app.command()
@@ -42,13 +45,22 @@ class InfoOptions:
 @without_collecting()
 def info(options: InfoOptions) -> None:
     """Show what was read from scan files, and what was assumed."""
-    from scanweld.io.depth.capture import collect_named
+    from scanweld.io.depth.capture import DepthImages, collect_named
     from scanweld.preparation.info import describe_scan
     from scanweld.work.threads import single_threaded_algebra
 
     failed = False
+    named = options.depth.named(options.files)
     with single_threaded_algebra():  # to wake threads takes longer than what they would do
-        for file in collect_named(options.depth.named(options.files)):
+        files = collect_named(named)
+        if isinstance(named, DepthImages):
+            from scanweld.app.capture_page import describe_capture
+
+            more = f" and {len(options.files) - 1} more" * (len(options.files) > 1)
+            typer.echo(describe_capture(files, options.files[0] + more, options.html))
+        elif options.html is not None:
+            raise InputError("--html shows depth images; these are other scans: leave it out")
+        for file in files:
             try:
                 typer.echo(describe_scan(file.read()))
             except ScanweldError as error:

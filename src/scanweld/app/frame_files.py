@@ -14,6 +14,8 @@ from scanweld.io.depth.frame import FrameSettings
 from scanweld.io.poses import load_json, read_text
 
 FRAMES = "frames.json"
+_BESIDE = ("mask", "color")
+"""Settings that are paths: they are written as seen from the model's folder."""
 _SETTINGS = TypeAdapter(dict[str, FrameSettings])
 
 
@@ -23,7 +25,7 @@ def write_frames(files: Sequence[ScanFile], folder: Path, final: Path) -> None:
     Args:
         files: Of all scans.
         folder: Where to write.
-        final: Where that folder will be, from which the masks are seen.
+        final: Where that folder will be, from which masks and colours are seen.
 
     Raises:
         WriteError: If the file cannot be written.
@@ -31,9 +33,9 @@ def write_frames(files: Sequence[ScanFile], folder: Path, final: Path) -> None:
     frames = {}
     for file in files:
         if isinstance(file, Frame):
-            mask = file.settings.mask
-            seen_from = None if mask is None else path_from(final, mask)
-            frames[file.name] = asdict(file.settings) | {"mask": seen_from}
+            told = asdict(file.settings)
+            seen = {key: path_from(final, told[key]) for key in _BESIDE if told[key] is not None}
+            frames[file.name] = told | seen
     if frames:
         write_whole(folder / FRAMES, json_text(frames).encode())
 
@@ -51,7 +53,10 @@ def read_frames(folder: Path) -> dict[str, FrameSettings]:
         found = _SETTINGS.validate_python(load_json(path, read_text(path)))
     except (ValidationError, ValueError) as error:
         raise ReadError(f"{path}: is broken; run scanweld again to write it anew") from error
-    return {
-        name: frame if frame.mask is None else replace(frame, mask=folder / frame.mask)
-        for name, frame in found.items()
-    }
+    return {name: _placed(frame, folder) for name, frame in found.items()}
+
+
+def _placed(frame: FrameSettings, folder: Path) -> FrameSettings:
+    """The settings with paths as they are seen from here."""
+    paths = {key: getattr(frame, key) for key in _BESIDE}
+    return replace(frame, **{k: folder / path for k, path in paths.items() if path is not None})

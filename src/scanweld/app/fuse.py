@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scanweld.app.cache import FileCache, cache_folder
+from scanweld.app.frame_files import write_frames
 from scanweld.app.html_report import write_html_report
 from scanweld.app.job import NO_LIMITS, Limits, read_all, relative_places
 from scanweld.app.outputs import write_outputs
@@ -13,7 +14,8 @@ from scanweld.errors import InputError
 from scanweld.fusion import fuse
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.io import collect, natural_key, printable
+from scanweld.io import natural_key, printable
+from scanweld.io.depth.capture import DepthOptions, as_named, collect_named
 from scanweld.io.pose_formats import Frame, PoseEntries, match_all_poses, read_any_poses
 from scanweld.io.pose_formats.records import require_pinhole
 from scanweld.knowledge.facts import Knowledge
@@ -55,7 +57,7 @@ def fuse_job(
             usable scans, or the output cannot be written.
     """
     config = config or Config()
-    files = collect(inputs)
+    files = collect_named(as_named(inputs, DepthOptions()))
     found = read_any_poses(poses)
     known, broken = match_all_poses(poses, found, [file.name for file in files])
     parts = [*(poses.iterdir() if poses.is_dir() else [poses]), *(file.path for file in files)]
@@ -74,6 +76,7 @@ def fuse_job(
             intake = take_in(scans, unreadable, Knowledge(), config, stages)
             result = _fuse(intake, known, found, without, config, stages)
         write_outputs(result, workspace.staging, relative_places(files, workspace.output))
+        write_frames(files, workspace.staging, workspace.output)
         with telling(progress, "report"):
             write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
         workspace.publish()

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scanweld.app.cache import FileCache, cache_folder
@@ -17,7 +17,7 @@ from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import ScanFile, path_from, printable
-from scanweld.io.depth.capture import DepthImages, collect_named
+from scanweld.io.depth.capture import DepthImages, collect_named, start_poses
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline import run as pipeline
 from scanweld.preparation.thinning import thinned
@@ -77,6 +77,7 @@ def run_job(
             no such cluster. Files that cannot be read are named in the result instead.
     """
     files, workers, memory = collect_named(inputs), limits.workers, limits.memory
+    known = _with_layout_poses(knowledge or Knowledge(), files)
     paths = [file.path for file in files]
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
@@ -91,7 +92,7 @@ def run_job(
         result = pipeline.run(
             scans,
             config or Config(),
-            knowledge=knowledge,
+            knowledge=known,
             unreadable=unreadable,
             workers=runner or workers,
             cache=cache,
@@ -106,6 +107,11 @@ def run_job(
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())
     return result
+
+
+def _with_layout_poses(known: Knowledge, files: Sequence[ScanFile]) -> Knowledge:
+    """What is known, with the poses that a capture has as starts if no others are given."""
+    return known if known.start is not None else replace(known, start=start_poses(files))
 
 
 def _runner(scheduler: str | None) -> AbstractContextManager[Runner | None]:

@@ -1,7 +1,7 @@
 """A model's folder, as ``scanweld run`` and ``scanweld fuse`` write it, opened again."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,7 +15,9 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet, ScanFile, collect, printable, read_mesh, read_poses
 from scanweld.io.depth.capture import Frame
 from scanweld.io.depth.frame import FrameSettings
-from scanweld.io.depth.images import depth_images, image_names
+from scanweld.io.depth.images import image_names
+from scanweld.io.depth.layouts.records import Shot
+from scanweld.io.depth.layouts.shots import shots_of
 from scanweld.io.pose_formats.records import printed
 from scanweld.preparation.thinning import thinned
 from scanweld.reconstruction import Reconstruction, ScanVerdict
@@ -194,11 +196,11 @@ class ModelFolder:
     def _given_files(self, given: Sequence[Path | str]) -> Mapping[str, ScanFile]:
         if not self._frames:
             return {file.name: file for file in collect(given)}
-        images = depth_images(given)
-        names = [printable(name) for name in image_names(images)]
+        shots = shots_of(given).shots
+        names = [printable(name) for name in image_names([shot.depth for shot in shots])]
         return {
-            name: self._file(path, name)
-            for path, name in zip(images, names, strict=True)
+            name: Frame(path=shot.depth, name=name, settings=_beside(self._frames[name], shot))
+            for shot, name in zip(shots, names, strict=True)
             if name in self._frames
         }
 
@@ -214,6 +216,16 @@ class ModelFolder:
         if settings is None:
             return ScanFile(path=path, name=name, part=part)
         return Frame(path=path, name=name, settings=settings)
+
+
+def _beside(settings: FrameSettings, shot: Shot) -> FrameSettings:
+    """The settings, with mask and colours from where they have been moved to with the image."""
+    moved = {
+        key: getattr(shot, key)
+        for key in ("mask", "color")
+        if (path := getattr(settings, key)) is not None and not path.is_file()
+    }
+    return replace(settings, **{key: path for key, path in moved.items() if path is not None})
 
 
 def open_model(path: Path, result: Reconstruction | None = None) -> ModelFolder:

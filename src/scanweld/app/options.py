@@ -157,7 +157,12 @@ class DepthOptions:
         float | None, typer.Option(min=0.0, help="Metres beyond which depths are left out.")
     ] = None
     masks: Annotated[
-        Path | None, typer.Option(help="Folder with a mask for each depth image: the object.")
+        Path | None,
+        typer.Option(help="Folder with a mask for each depth image, or a pattern: the object."),
+    ] = None
+    color: Annotated[
+        Path | None,
+        typer.Option(help="Folder with a colour image for each depth image; none for none."),
     ] = None
 
     def named(self, inputs: list[str]) -> "Sequence[Path | str] | DepthImages":
@@ -171,6 +176,7 @@ class DepthOptions:
                 scale=self.depth_scale,
                 max_depth=self.depth_max,
                 masks=self.masks,
+                color=self.color,
             ),
         )
 

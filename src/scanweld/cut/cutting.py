@@ -38,11 +38,13 @@ class CutSet:
         scans: In the order in which they came, those of which nothing is left without.
         kept: (H, W) cells of the grid that were kept, by the name of each scan that was cut.
         empty: Reason for each scan of which nothing is left, by name.
+        reason: Why nothing was cut, if so.
     """
 
     scans: tuple[RangeScan, ...]
     kept: Mapping[str, BoolArray] = field(default_factory=dict)
     empty: Mapping[str, str] = field(default_factory=dict)
+    reason: str = ""
 
 
 def cut_out(scans: Sequence[RangeScan], shown: Shown) -> CutSet:
@@ -64,7 +66,7 @@ def cut_out(scans: Sequence[RangeScan], shown: Shown) -> CutSet:
         if shown == "moving":
             raise InputError(f"{found}; {REMEDY}")
         logger.debug("nothing is cut: %s", found)
-        return CutSet(scans=tuple(scans))
+        return CutSet(scans=tuple(scans), reason=found)
     empty = {
         name: "nothing moved in this frame: it shows the table and the background alone"
         for name, mask in found.items()

@@ -12,7 +12,8 @@ from scanweld.evaluation.metrics import (
     Standing,
     evaluate,
 )
-from scanweld.io import collect, natural_key, read_poses
+from scanweld.io import natural_key, read_poses
+from scanweld.io.depth.capture import DepthOptions, as_named, collect_named
 
 
 def compare(
@@ -33,7 +34,8 @@ def compare(
     found = read_poses(estimate)
     if not scans:
         return evaluate(found, reference)
-    files = {file.name: file for file in collect(scans) if file.name in reference}
+    named = collect_named(as_named(scans, DepthOptions()))
+    files = {file.name: file for file in named if file.name in reference}
     if missing := sorted(set(reference) & set(found.poses) - set(files), key=natural_key):
         raise InputError(f"{missing[0]}: has a pose but is not among the scans given")
     read = [file.read() for file in files.values()]

@@ -1,13 +1,13 @@
-"""What was cut off each scan: its depth in grey, with the pixels that were kept in colour."""
+"""Depth frames as pictures: what was cut off them, and the colours that they have."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from scanweld.app.html_report.stills import Still, still_of
 from scanweld.cut import mask_of
 from scanweld.cut.frames import depth_image
-from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
+from scanweld.geometry.arrays import BoolArray, ByteArray
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanReport
@@ -18,6 +18,8 @@ GREYS = (235.0, 60.0)
 """Of what is near and of what is far."""
 KEPT = (0.35, 0.8, 0.55)
 """How the grey of pixels that were kept is tinted."""
+COLOR_WIDTH = 160
+"""The same of one of colours, which takes more bytes."""
 NOTHING = (24, 28, 40)
 """Colour of pixels that saw nothing."""
 
@@ -32,15 +34,46 @@ def cut_pictures(
         scans: As they were read; those that are missing have no picture.
     """
     return {
-        name: still_of(
-            _picture(depth_image(scans[name]), mask_of(kept)), f"What was kept of {name}"
-        )
+        name: depth_picture(scans[name], mask_of(kept), f"What was kept of {name}")
         for name in sorted(reports, key=natural_key)
         if (kept := reports[name].kept) is not None and name in scans
     }
 
 
-def _picture(depth: FloatArray, kept: BoolArray) -> ByteArray:
+def color_pictures(names: Collection[str], scans: Mapping[str, RangeScan]) -> dict[str, Still]:
+    """The colours that depth frames have, as pictures by name.
+
+    Args:
+        names: Of the scans that are shown.
+        scans: As they were read; those without a camera, a grid or colours have no picture.
+    """
+    return {
+        name: still_of(_colors(scans[name]), f"Colours of {name}")
+        for name in sorted(names, key=natural_key)
+        if name in scans and _is_colored(scans[name])
+    }
+
+
+def _is_colored(scan: RangeScan) -> bool:
+    return scan.camera is not None and scan.grid is not None and scan.colors is not None
+
+
+def _colors(scan: RangeScan) -> ByteArray:
+    assert scan.grid is not None and scan.colors is not None
+    step = -(-scan.grid.shape[1] // COLOR_WIDTH)
+    grid = scan.grid[::step, ::step]
+    return np.where((grid >= 0)[..., None], scan.colors[grid], np.array(NOTHING, dtype=np.uint8))
+
+
+def depth_picture(scan: RangeScan, kept: BoolArray | None, alt: str) -> Still:
+    """The depths of a scan with a grid in grey, those of some pixels (H, W) in colour."""
+    return still_of(picture_of(scan, kept), alt)
+
+
+def picture_of(scan: RangeScan, kept: BoolArray | None = None) -> ByteArray:
+    """The same as pixels (h, w, 3)."""
+    depth = depth_image(scan)
+    kept = np.zeros(depth.shape, dtype=bool) if kept is None else kept
     step = -(-depth.shape[1] // WIDTH)
     depth, kept = depth[::step, ::step], kept[::step, ::step]
     has = np.isfinite(depth)

@@ -16,7 +16,7 @@ from scanweld.app.html_report.colors import (
     scan_colors,
 )
 from scanweld.app.html_report.contour_overlays import Overlay, contour_overlays
-from scanweld.app.html_report.cut_pictures import cut_pictures
+from scanweld.app.html_report.cut_pictures import color_pictures, cut_pictures
 from scanweld.app.html_report.definitions import DEFINITIONS
 from scanweld.app.html_report.histogram import histogram
 from scanweld.app.html_report.orientation import as_seen_from
@@ -75,8 +75,9 @@ def report_page(
         model: What a run wrote.
         sources: The scans; None leaves out what only they can tell.
         config: Settings of the run.
-        scans: By name, as they were read, for pictures of what was cut off them.
+        scans: By name, as they were read, for pictures of what was cut off them and of colours.
     """
+    cuts = cut_pictures(model.report.scans, scans)
     looks = scan_looks(list(model.report.scans))
     sizes = [scan.diameter for scan in model.report.scans.values() if scan.diameter]
     diameter = float(np.median(sizes)) if sizes else None
@@ -109,7 +110,8 @@ def report_page(
         **_outcome(model),
         **_graph(model, looks),
         **_surface(model, sources, looks),
-        cuts=cut_pictures(model.report.scans, scans),
+        cuts=cuts,
+        photos=color_pictures({*model.poses.poses, *cuts}, scans),
         overlays=_overlays(model, sources, config),
         stages=model.report.stages,
         settings=model.report.settings,

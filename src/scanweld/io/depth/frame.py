@@ -1,6 +1,6 @@
 """A depth image as a scan: its points in metres, its grid, and the camera that stood there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,9 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.io.depth.colors import colors_for
 from scanweld.io.depth.intrinsics import Intrinsics
-from scanweld.io.depth.lens import undistorted
+from scanweld.io.depth.lens import undistorted, undistorted_colors
 from scanweld.io.depth.pixels import read_mask, read_pixels
 from scanweld.io.depth.scale import DepthScale
 
@@ -28,12 +29,18 @@ class FrameSettings:
         scale: Of the values.
         max_depth: Metres beyond which all is left out; no limit if None.
         mask: Image of the pixels that are the object; all are if None.
+        color: Colour image of the same view; none if None.
+        is_color_scaled: Whether the colour image may be of another size.
+        told: What else is to be said of it.
     """
 
     intrinsics: Intrinsics
     scale: DepthScale
     max_depth: float | None = None
     mask: Path | None = None
+    color: Path | None = None
+    is_color_scaled: bool = False
+    told: tuple[str, ...] = ()
 
 
 def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
@@ -45,22 +52,29 @@ def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
     """
     values = read_pixels(path)
     camera = camera_of(path, settings.intrinsics, (values.shape[0], values.shape[1]))
-    depth, notes = settings.scale.depth(values), settings.scale.notes
+    depth, notes = settings.scale.depth(values), settings.scale.notes + settings.told
     if max(_off_middle(settings.intrinsics, camera.width, camera.height)) > _FAR_OFF:
         notes += ("the camera's centre is far from the middle: are these its intrinsics?",)
     seen = np.isfinite(depth)
     if not seen.any():
         raise ReadError(f"{path}: no pixel has a depth; leave it out")
-    if settings.intrinsics.distortion:
-        depth = undistorted(depth, camera, settings.intrinsics.distortion)
-        notes += ("lens distortion undone",)
     notes += (f"{100 * (1 - seen.mean()):.0f} % of the pixels are without return",)
     depth, cut = _without_far(path, depth, settings.max_depth)
     notes += cut
     if settings.mask is not None:
         depth, cut = _masked(path, depth, settings.mask)
         notes += cut
-    return _scan(name, depth, camera, notes)
+    colors = None
+    if settings.color is not None:
+        shape = (camera.height, camera.width)
+        colors, told = colors_for(settings.color, shape, is_scaled=settings.is_color_scaled)
+        notes += (told,)
+    if lens := settings.intrinsics.distortion:
+        depth = undistorted(depth, camera, lens)
+        colors = None if colors is None else undistorted_colors(colors, camera, lens)
+        notes += ("lens distortion undone",)
+    scan = scan_of_depth(name, depth, camera, notes)
+    return scan if colors is None else replace(scan, colors=colors[np.isfinite(depth)])
 
 
 def camera_of(path: Path, intrinsics: Intrinsics, shape: tuple[int, int]) -> Camera:
@@ -138,7 +152,10 @@ def _masked(path: Path, depth: FloatArray, mask: Path) -> tuple[FloatArray, tupl
     return np.where(is_object, depth, np.nan), (f"cut to its mask: {100 * kept:.0f} % of it kept",)
 
 
-def _scan(name: str, depth: FloatArray, camera: Camera, notes: tuple[str, ...]) -> RangeScan:
+def scan_of_depth(
+    name: str, depth: FloatArray, camera: Camera, notes: tuple[str, ...] = ()
+) -> RangeScan:
+    """A depth image (H, W), NaN where nothing was seen, as a scan in its camera's frame."""
     has = np.isfinite(depth)
     grid = np.full(depth.shape, -1, dtype=np.int64)
     grid[has] = np.arange(has.sum())

@@ -3,12 +3,12 @@
 import glob
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from scanweld.errors import InputError, ReadError
 from scanweld.io.collect import collect
-from scanweld.io.depth.pixels import IMAGE_SUFFIXES, SUFFIXES
+from scanweld.io.depth.pixels import COLOR_SUFFIXES, IMAGE_SUFFIXES, SUFFIXES, holds_depths
 from scanweld.io.names import natural_key
 
 _INTRINSICS = (
@@ -33,11 +33,13 @@ def found_intrinsics(folder: Path) -> Path | None:
 
 
 def are_depth_images(inputs: Sequence[Path | str]) -> bool:
-    """Whether images are named, or a folder that holds them and intrinsics but no other scans."""
+    """Whether images are named, or a folder that holds depths but no other scans."""
     paths = [Path(each) for each in inputs]
     if len(paths) == 1 and paths[0].is_dir():
         images = _depth_folder(paths[0])
-        return bool(_among(images)) and bool(found_intrinsics(images)) and _no_scans(paths[0])
+        found = _among(images)
+        are_meant = bool(found_intrinsics(images)) or (bool(found) and holds_depths(found[0]))
+        return bool(found) and are_meant and not other_scans(paths[0])
     return bool(paths) and all(path.suffix.lower() in IMAGE_SUFFIXES for path in paths)
 
 
@@ -95,34 +97,95 @@ def image_names(paths: Sequence[Path]) -> list[str]:
     return [Path(os.path.relpath(path, above)).as_posix() for path in paths]
 
 
-def masks_of(paths: Sequence[Path], folder: Path) -> dict[Path, Path]:
+def by_name(paths: Sequence[Path], folder: Path, names: Sequence[str]) -> dict[Path, Path]:
+    """By each image the colour image of its name in the first folder that is there, if any."""
+    place = next((folder / name for name in names if (folder / name).is_dir()), None)
+    found = {} if place is None else _by_key(sorted(place.iterdir()), COLOR_SUFFIXES)
+    return {p: found[_key(p)][0] for p in paths if len(found.get(_key(p), ())) == 1}
+
+
+def num_colors(folder: Path, names: Sequence[str]) -> int:
+    """Colour images in the first of some folders that is there."""
+    place = next((folder / name for name in names if (folder / name).is_dir()), None)
+    found = {} if place is None else _by_key(sorted(place.iterdir()), COLOR_SUFFIXES)
+    return sum(map(len, found.values()))
+
+
+def colors_of(paths: Sequence[Path], folder: Path) -> dict[Path, Path]:
+    """By each image the colour image of the same name, but for words such as depth and color.
+
+    Raises:
+        InputError: If there is none for an image.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder; --color takes one of colour images, or none")
+    found = by_name(paths, folder.parent, (folder.name,))
+    check_colors(folder, paths, found)
+    return found
+
+
+def check_colors(where: Path, paths: Sequence[Path], found: Mapping[Path, Path]) -> None:
+    """Refuse colour images that some depth images have and some not.
+
+    Raises:
+        InputError: If there is none for an image.
+    """
+    missing = [path.name for path in paths if path not in found]
+    if missing:
+        raise InputError(
+            f"{where}: {len(missing)} of {len(paths)} depth images have no colour image of their "
+            f"name, such as {missing[0]}; name them alike, or give --color none"
+        )
+
+
+def masks_of(paths: Sequence[Path], place: Path) -> dict[Path, Path]:
     """By each image the mask of the same name, but for words such as depth and mask.
+
+    A mask 000003_000001 is of the image 000003, too: BOP counts the objects of an image.
+
+    Args:
+        paths: Of the images.
+        place: A folder, or a glob pattern.
 
     Raises:
         InputError: If there is none for an image, or several.
     """
-    if not folder.is_dir():
-        raise InputError(f"{folder}: is no folder; --masks takes one with a mask for each image")
-    found: dict[str, list[Path]] = {}
-    for path in sorted(folder.iterdir()):
-        if path.suffix.lower() in SUFFIXES:
-            found.setdefault(_key(path), []).append(path)
-    missing = [path.name for path in paths if len(found.get(_key(path), ())) != 1]
+    if place.is_dir():
+        masks = sorted(place.iterdir())
+    elif glob.has_magic(str(place)):
+        masks = [Path(match) for match in sorted(glob.glob(str(place)))]
+    else:
+        raise InputError(f"{place}: is no folder; --masks takes one with a mask for each image")
+    found = _by_key(masks, SUFFIXES)
+    of_objects = _by_key(masks, SUFFIXES, lambda path: path.stem.partition("_")[0].lower())
+    found = {path: found.get(_key(path), of_objects.get(_key(path), [])) for path in paths}
+    missing = [path.name for path in paths if len(found[path]) != 1]
     if missing:
         raise InputError(
-            f"{folder}: {len(missing)} of {len(paths)} depth images have not exactly one mask of "
-            f"their name there, such as {missing[0]}; name the masks as the images"
+            f"{place}: {len(missing)} of {len(paths)} depth images have not exactly one mask of "
+            f"their name there, such as {missing[0]}; name the masks as the images, or give a "
+            "pattern that chooses one for each"
         )
-    return {path: found[_key(path)][0] for path in paths}
+    return {path: found[path][0] for path in paths}
+
+
+def _by_key(
+    paths: Sequence[Path], suffixes: Sequence[str], key: Callable[[Path], str] | None = None
+) -> dict[str, list[Path]]:
+    found: dict[str, list[Path]] = {}
+    for path in paths:
+        if path.suffix.lower() in suffixes and not path.name.startswith("."):
+            found.setdefault((key or _key)(path), []).append(path)
+    return found
 
 
 def _key(path: Path) -> str:
     return _WORDS.sub("", path.stem.lower())
 
 
-def _no_scans(folder: Path) -> bool:
+def other_scans(folder: Path) -> list[str]:
+    """Names of the files of a folder that are scans of other formats."""
     try:
-        collect([folder])
+        return [file.path.name for file in collect([folder])]
     except InputError:
-        return True
-    return False
+        return []

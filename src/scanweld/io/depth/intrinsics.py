@@ -87,6 +87,18 @@ def read_intrinsics(path: Path) -> Intrinsics:
         ) from error
 
 
+def intrinsics_of_entry(path: Path, entry: Mapping[str, Any]) -> Intrinsics:
+    """The intrinsics in a part of a JSON file, with the file's path for messages.
+
+    Raises:
+        ReadError: If it has none.
+    """
+    try:
+        return _of_json(entry)
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise ReadError(f"{path}: no intrinsics that can be used ({error}); correct it") from error
+
+
 def _intrinsics(text: str) -> Intrinsics:
     if text.lstrip().startswith("{"):
         return _of_json(json.loads(text))

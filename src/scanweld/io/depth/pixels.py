@@ -1,4 +1,4 @@
-"""Images of depths and masks as arrays: PNG, TIFF, NPY and NPZ."""
+"""Images of depths, masks and colours as arrays: PNG, TIFF, JPEG, EXR, NPY and NPZ."""
 
 import warnings
 from pathlib import Path
@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import BoolArray
+from scanweld.geometry.arrays import BoolArray, ByteArray
 from scanweld.io.scan_formats.numpy_array import read_arrays
+from scanweld.io.scan_formats.records import needed
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff")
-SUFFIXES = (*IMAGE_SUFFIXES, ".npy", ".npz")
+SUFFIXES = (*IMAGE_SUFFIXES, ".exr", ".npy", ".npz")
+COLOR_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 _DEPTH_MODES = ("I;16", "I;16B", "I;16L", "I;16N", "I", "F")
 """Pillow's names of one number a pixel with more than eight bits."""
 
@@ -22,7 +24,9 @@ def read_pixels(path: Path) -> NDArray:
     Raises:
         ReadError: If it is no image, or one that cannot hold depths.
     """
-    values = _array(path) if path.suffix.lower() not in IMAGE_SUFFIXES else _image(path)
+    suffix = path.suffix.lower()
+    read = _image if suffix in IMAGE_SUFFIXES else _channel if suffix == ".exr" else _array
+    values = read(path)
     if values.ndim == 3 and 1 in (values.shape[0], values.shape[2]):
         values = values.reshape([size for size in values.shape if size > 1] or [1])
     if values.ndim != 2 or not values.size or values.dtype.kind not in "uif":
@@ -44,6 +48,48 @@ def read_mask(path: Path) -> BoolArray:
     return np.asarray((values != 0).any(axis=-1) if values.ndim == 3 else values != 0)
 
 
+def read_colors(path: Path) -> ByteArray:
+    """Red, green and blue (H, W, 3) of an image.
+
+    Raises:
+        ReadError: If it cannot be read.
+    """
+    values = _image(path, depths=False)
+    if values.dtype == np.bool_:
+        values = values.astype(np.uint8) * np.uint8(255)
+    if values.ndim == 2:
+        values = np.repeat(values[..., None], 3, axis=2)
+    if values.dtype != np.uint8:
+        raise ReadError(f"{path}: holds {values.dtype}, no colours of 8 bits; give --color none")
+    return np.ascontiguousarray(values[..., :3])
+
+
+def holds_depths(path: Path) -> bool:
+    """Whether a file is an image of more than eight bits a pixel; only its head is read."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            return image.mode in _DEPTH_MODES
+    except Exception:  # whoever reads it says what is wrong
+        return False
+
+
+def _channel(path: Path) -> NDArray:
+    """The depths of an EXR image: its only channel, or that of a usual name."""
+    library = needed(path, "OpenEXR", "exr")
+    try:
+        with library.File(str(path), separate_channels=True) as file:
+            channels = {name: np.array(each.pixels) for name, each in file.channels().items()}
+    except Exception as error:  # whatever the library throws at a damaged file
+        raise ReadError(
+            f"{path}: cannot be read as EXR ({' '.join(str(error).split())[:100]}); copy it again "
+            "or leave it out"
+        ) from error
+    name = next((n for n in ("Z", "Y", "V", "depth", "R") if n in channels), min(channels))
+    return channels[name].astype(np.float32)
+
+
 def _image(path: Path, *, depths: bool = True) -> NDArray:
     from PIL import Image
 
@@ -57,7 +103,7 @@ def _image(path: Path, *, depths: bool = True) -> NDArray:
                         f"{path}: a picture ({image.mode}, 8 bits a pixel), not depths; name the "
                         "16-bit depth images"
                     )
-                with_colors = image.mode in ("P", "RGBA", "LA")  # whose opacity says nothing
+                with_colors = image.mode in ("P", "RGBA", "LA", "CMYK", "YCbCr")  # opacity is none
                 return np.asarray(image.convert("RGB") if with_colors else image)
     except ReadError:
         raise
