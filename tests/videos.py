@@ -1,9 +1,12 @@
 """Small simulated videos with exact truth."""
 
+import json
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from benchmarks.virtual.handheld import (
     KINECT as WIDE_KINECT,
@@ -88,3 +91,15 @@ def tracked(frames: list[VideoFrame]) -> tuple[list[Keyframe], Log]:
     log = Log()
     noise = depth_noise([frame.depth for frame in frames[:3]])
     return list(keyframes(frames, CAMERA, noise, OBSERVABILITY, log)), log
+
+
+def written(made: Video, folder: Path) -> Path:
+    """The folder, with the frames as depth images in tenths of millimetres, and their camera."""
+    (folder / "depth").mkdir(parents=True)
+    for frame in made.frames:
+        values = np.nan_to_num(frame.depth * 10_000).round().astype(np.uint16)
+        Image.fromarray(values).save(folder / "depth" / f"{frame.name}.png")
+    keys = ("fx", "fy", "cx", "cy", "width", "height")
+    told = {key: getattr(made.camera, key) for key in keys} | {"depth_scale": 10_000}
+    (folder / "intrinsics.json").write_text(json.dumps(told))
+    return folder / "depth"

@@ -158,7 +158,7 @@ def _plane_near(
             off = abs(qz - qz * (a * qx + b * qy + c * qz))
             if off > apart:
                 return -1, -1
-            if max(abs(v - j), abs(u - i)) == 1 and off <= apart:   # False where there is none
+            if max(abs(v - j), abs(u - i)) == 1 and off <= apart:  # False where there is none
                 count += 1
                 if off <= best:
                     best, at_j, at_i = off, v, u
