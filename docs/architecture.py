@@ -23,7 +23,7 @@ LAYERS = (
     ("confidence", "knowledge"),
     ("graph", "published", "reconstruction"),
     ("sensor",),
-    ("pairs", "fusion", "evaluation"),
+    ("pairs", "fusion", "evaluation", "video"),
     ("evidence", "heat", "refinement", "preparation", "cut", "work", "io"),
     ("contours",),
     ("geometry", "config"),

@@ -12,6 +12,7 @@ from scanweld.app.html_report import write_html_report
 from scanweld.app.memory import MEGABYTE, points_within, workers_within
 from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import Place, write_outputs
+from scanweld.app.video_job import Video, placed, take_video
 from scanweld.app.workspace import Workspace
 from scanweld.config import Config
 from scanweld.errors import InputError, ReadError
@@ -52,7 +53,7 @@ NO_LIMITS = Limits()
 
 
 def run_job(
-    inputs: Sequence[Path | str] | DepthImages,
+    inputs: Sequence[Path | str] | DepthImages | Video,
     output: Path | str,
     config: Config | None = None,
     *,
@@ -64,7 +65,8 @@ def run_job(
     """Read scans, register and fuse them, and write what was found out: ``scanweld run``.
 
     Args:
-        inputs: Files, folders and glob patterns; or depth images with what is known of them.
+        inputs: Files, folders and glob patterns; or depth images with what is known of them, which
+            may be the frames of a video.
         output: The folder to be made; it appears when it is whole.
         config: Settings; the defaults if not given.
         knowledge: What is known of the scans beforehand.
@@ -76,29 +78,50 @@ def run_job(
         ScanweldError: If there is too little to work on, the output cannot be written, or there is
             no such cluster. Files that cannot be read are named in the result instead.
     """
-    files, workers, memory = collect_named(inputs), limits.workers, limits.memory
-    known = _with_layout_poses(knowledge or Knowledge(), files)
+    config, known = config or Config(), knowledge or Knowledge()
+    video, workers, memory = None, limits.workers, limits.memory
+    if isinstance(inputs, Video):
+        files = inputs.collect()
+    else:
+        files = collect_named(inputs)
+        known = _with_layout_poses(known, files)
     paths = [file.path for file in files]
     cache = FileCache(cache_folder(Path(output))) if limits.keeps else None
     with (
         Workspace(Path(output), inputs=paths, force=force) as workspace,
         _runner(limits.scheduler) as runner,
     ):
+        if isinstance(inputs, Video):
+            video = take_video(
+                inputs.collect(),
+                workspace.staging,
+                config.pairs.min_observability,
+                num_workers(workers),
+                progress,
+            )
+            files, paths = video.files, [file.path for file in video.files]
+            known = Knowledge(start=video.start).joined(known)
         max_points = None if memory is None else points_within(memory, paths)
         scans, unreadable = read_all(files, progress, max_points)
+        if video is not None:
+            unreadable.update(video.unreadable)
         if memory is not None:
             num_points = [len(scan.points) for scan in scans]
             workers = workers_within(memory, num_points, num_workers(workers))
         result = pipeline.run(
             scans,
-            config or Config(),
+            config,
             knowledge=known,
             unreadable=unreadable,
             workers=runner or workers,
             cache=cache,
             progress=progress,
         )
-        places = relative_places(files, workspace.output)
+        if video is not None:
+            result = video.told(result)
+        places = relative_places(
+            placed(files, workspace.staging, workspace.output), workspace.output
+        )
         write_outputs(result, workspace.staging, places, max_points)
         write_frames(files, workspace.staging, workspace.output)
         with telling(progress, "report"):

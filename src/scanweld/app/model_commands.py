@@ -26,6 +26,10 @@ from scanweld.choices import Method, Shown
 from scanweld.errors import ExitCode
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from scanweld.app.video_job import Video
+    from scanweld.io.depth.capture import DepthImages
     from scanweld.knowledge.facts import Knowledge
 
 # What the commands do is imported inside them: help then starts at once.
@@ -101,6 +105,10 @@ class RunOptions:
             help="Of whole depth frames: auto (the default), moving things only, or all.",
         ),
     ] = None
+    video: Annotated[
+        bool,
+        typer.Option("--video", help="The depth images are a video, in the order of their names."),
+    ] = False
     min_accuracy: Annotated[
         float | None,
         typer.Option(
@@ -120,6 +128,16 @@ class RunOptions:
     depth: DepthOptions
     force: Force = False
     show: ShowOptions
+
+    def named(self) -> "Sequence[Path | str] | DepthImages | Video":
+        """What a user names: files, depth images, or a video of such."""
+        named = self.depth.named(self.inputs)
+        if not self.video:
+            return named
+        from scanweld.app.video_job import Video
+        from scanweld.io.depth.capture import DepthImages
+
+        return Video(images=named if isinstance(named, DepthImages) else DepthImages(inputs=named))
 
 
 @takes(RunOptions)
@@ -157,7 +175,7 @@ def run(options: RunOptions) -> None:
                 scheduler=options.scheduler,
             )
             result = run_job(
-                options.depth.named(options.inputs),
+                options.named(),
                 output,
                 settings,
                 knowledge=known,

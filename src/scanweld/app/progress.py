@@ -87,7 +87,10 @@ class Count(ProgressColumn):
         """The column's text."""
         if task.finished:
             return Text(task.fields["counted"])
-        return Text("" if task.total is None else f"{task.completed:.0f}/{task.total:.0f}")
+        if task.total is None:
+            return Text("")
+        many = f", {task.speed:.0f}/s" if task.speed is not None and task.speed >= 2 else ""
+        return Text(f"{task.completed:.0f}/{task.total:.0f}{many}")
 
 
 def bars_on(console: Console) -> Bars:

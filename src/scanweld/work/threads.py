@@ -1,8 +1,9 @@
 """Work over scans and pairs: the same results in the same order, whatever the number of workers."""
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from typing import TypeVar
 
@@ -37,5 +38,28 @@ def map_in_order(
     with ThreadPoolExecutor(workers) as pool:
         try:
             yield from pool.map(function, items)
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def map_ahead(
+    function: Callable[[Item], Result], items: Sequence[Item], workers: int
+) -> Iterator[Result]:
+    """The same for results that are large: only as many are worked out ahead as there are workers.
+
+    One worker is who asks for them.
+    """
+    if workers == 1:
+        yield from map(function, items)
+        return
+    coming: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(workers - 1) as pool:
+        try:
+            for item in items:
+                coming.append(pool.submit(function, item))
+                if len(coming) == workers:
+                    yield coming.popleft().result()
+            while coming:
+                yield coming.popleft().result()
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
