@@ -89,7 +89,7 @@ def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructio
         stages: Bookkeeping of the run.
     """
     scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
-    method = METHODS[config.method](scene, config)
+    method = METHODS[config.method](scene, config, stages.workers)
     registered = learnt(register_pairs(scene, method, config, stages), config, stages)
     scene = registered.scene
     axis = common_axis(scene, registered.pairs, config)
