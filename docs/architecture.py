@@ -24,8 +24,8 @@ LAYERS = (
     ("graph", "published", "reconstruction"),
     ("sensor",),
     ("pairs", "fusion", "evaluation", "video"),
-    ("evidence", "heat", "refinement", "preparation", "cut", "work", "io"),
-    ("contours",),
+    ("evidence", "heat", "refinement", "preparation", "cut", "io"),
+    ("contours", "work"),
     ("geometry", "config"),
     ("errors", "choices", "compiled"),
 )

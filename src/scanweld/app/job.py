@@ -125,7 +125,8 @@ def run_job(
         write_outputs(result, workspace.staging, places, max_points)
         write_frames(files, workspace.staging, workspace.output)
         with telling(progress, "report"):
-            write_html_report(workspace.staging, {scan.name: scan for scan in scans}, result)
+            shown = {scan.name: scan for scan in scans}
+            write_html_report(workspace.staging, shown, result, num_workers(workers))
         workspace.publish()
     if memory is not None and peak_memory_mb() > memory / MEGABYTE:
         logger.warning("the run took %.0f MB, more than it was to take", peak_memory_mb())

@@ -3,7 +3,10 @@
 import json
 import math
 from collections.abc import Mapping
+from json.encoder import encode_basestring
 from typing import Any
+
+_LEAVES = (float, str, int, bool, type(None))
 
 
 def json_text(value: Mapping[str, Any]) -> str:
@@ -12,6 +15,9 @@ def json_text(value: Mapping[str, Any]) -> str:
 
 
 def _text(value: Any, newline: str) -> str:
+    # Most of what there is are numbers and texts, and to ask whether they are mappings is slow.
+    if type(value) in _LEAVES:
+        return _leaf(value)
     inner = newline + " "
     if isinstance(value, Mapping) and value:
         items = (f"{_leaf(str(key))}: {_text(item, inner)}" for key, item in value.items())
@@ -26,5 +32,9 @@ def _text(value: Any, newline: str) -> str:
 
 def _leaf(value: Any) -> str:
     if isinstance(value, float):
-        value = value + 0.0 if math.isfinite(value) else None  # + 0.0: no minus zero
+        if not math.isfinite(value):
+            return "null"
+        return float.__repr__(value + 0.0)  # + 0.0: no minus zero
+    if isinstance(value, str):
+        return encode_basestring(value)
     return json.dumps(value, ensure_ascii=False, allow_nan=False)

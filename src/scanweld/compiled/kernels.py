@@ -58,10 +58,14 @@ def provide_cache(chosen: str = "") -> Path:
     return folder
 
 
+def kept_folder() -> Path:
+    """Where compiled code of this state of the source is kept."""
+    return Path(config.CACHE_DIR)  # type: ignore[attr-defined]
+
+
 def kept_names() -> set[str]:
     """The last two parts of the names of all kernels that are kept compiled, as ``icp._refine``."""
-    folder = Path(config.CACHE_DIR)  # type: ignore[attr-defined]
-    return {path.name.split("-")[0] for path in folder.rglob("*.nbi")}
+    return {path.name.split("-")[0] for path in kept_folder().rglob("*.nbi")}
 
 
 def types_of(arguments: str) -> tuple[Any, ...]:

@@ -20,6 +20,7 @@ from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import Alternative, PairKind, PairResult
 from scanweld.sensor.accuracy import pose_deviations
+from scanweld.work.threads import map_in_rows
 
 MAX_UNDECIDED_CONFIDENCE = 0.49
 """Most confidence in a pose that what was seen leaves open: it slides, another fits as well, or too
@@ -54,7 +55,11 @@ class Confidence:
 
 
 def assess(
-    graph: ViewGraph, diagnostics: PairDiagnostics, calibration: Calibration, config: Config
+    graph: ViewGraph,
+    diagnostics: PairDiagnostics,
+    calibration: Calibration,
+    config: Config,
+    workers: int = 1,
 ) -> Confidence:
     """Give every pair that has a pose, and every placed scan, its confidence.
 
@@ -63,34 +68,40 @@ def assess(
         diagnostics: All scans of the run.
         calibration: The models.
         config: Settings: what leaves a pose open.
+        workers: Threads; the result is the same for any number.
     """
-    sensor, deviations = diagnostics.sensor, _deviations(graph, diagnostics)
+    sensor, deviations = diagnostics.sensor, _deviations(graph, diagnostics, workers)
     bounds = calibration.bounds.of(deviations, sensor.sigma, sensor.diameter)
     homes: dict[int, JointEvidence] = {}
     for component in graph.components:
-        joint = joint_evidence(graph, component, diagnostics)
+        joint = joint_evidence(graph, component, diagnostics, workers)
         homes.update(dict.fromkeys(component.poses, joint))
-    pairs = {}
-    for edge, found in graph.pairs.items():
+
+    def assessed(edge: Edge) -> Assessed | None:
         # Where users' facts leave a pair no pose, what was found is assessed.
         usable = graph.usable[edge]
-        result = found if usable.best is None else usable
+        result = graph.pairs[edge] if usable.best is None else usable
         chosen = graph.accepted.get(edge) or result.best
-        if chosen is not None:
-            judged = result, chosen
-            pairs[edge] = _assess_pair(*judged, graph, homes, diagnostics, calibration, config)
+        if chosen is None:
+            return None
+        return _assess_pair(result, chosen, graph, homes, diagnostics, calibration, config)
+
+    told = zip(graph.pairs, map_in_rows(assessed, [*graph.pairs], workers), strict=True)
+    pairs = {edge: pair for edge, pair in told if pair is not None}
     scans = _assess_scans(graph, homes, pairs, calibration, config)
     return Confidence(pairs=pairs, scans=scans, bounds=bounds, deviations=deviations)
 
 
-def _deviations(graph: ViewGraph, diagnostics: PairDiagnostics) -> dict[int, PoseTolerance]:
+def _deviations(
+    graph: ViewGraph, diagnostics: PairDiagnostics, workers: int
+) -> dict[int, PoseTolerance]:
     """Standard deviation of the pose of each placed scan."""
     sources = dict(enumerate(diagnostics.sources))
     return {
         k: deviation
         for component in graph.components
         for k, deviation in pose_deviations(
-            sources, component.poses, graph.compared(component), diagnostics.sensor
+            sources, component.poses, graph.compared(component), diagnostics.sensor, workers
         ).items()
     }
 

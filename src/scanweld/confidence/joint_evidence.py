@@ -23,6 +23,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.merge import Merge, propose_merges
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
+from scanweld.work.threads import map_in_order, map_in_rows
 
 MIN_CONDUCTANCE = 0.02
 """Accepted pairs conduct by their score, and none less than this."""
@@ -60,7 +61,7 @@ class JointEvidence:
 
 
 def joint_evidence(
-    graph: ViewGraph, component: Component, diagnostics: PairDiagnostics
+    graph: ViewGraph, component: Component, diagnostics: PairDiagnostics, workers: int = 1
 ) -> JointEvidence:
     """Ask all scans of a component about each of them.
 
@@ -68,24 +69,31 @@ def joint_evidence(
         graph: The view graph.
         component: One of its components.
         diagnostics: All scans of the run.
+        workers: Threads.
     """
     poses = component.poses
-    between = {
-        (i, j): diagnostics.judge.pair(i, j, poses[i].inverse() @ poses[j])
-        for i, j in graph.compared(component)
-    }
+    edges = graph.compared(component)
+
+    def evidence(edge: Edge) -> Evidence:
+        i, j = edge
+        return diagnostics.judge.pair(i, j, poses[i].inverse() @ poses[j])
+
+    between = dict(zip(edges, map_in_rows(evidence, edges, workers), strict=True))
     near = {
         k: {m: poses[m] for edge in between if k in edge for m in edge if m != k} for k in poses
     }
-    standings = {
-        k: _standing(k, graph, {k: poses[k], **near[k]}, between, diagnostics)
-        for k in sorted(poses)
-    }
+
+    def look(k: int) -> tuple[_Standing, Fit]:
+        own = {k: poses[k], **near[k]}
+        return _standing(k, graph, own, between, diagnostics), _fit(k, own, diagnostics)
+
+    scans = sorted(poses)
+    looks = dict(zip(scans, map_in_order(look, scans, workers), strict=True))
     return JointEvidence(
         between=between,
-        margins={k: standing.margin for k, standing in standings.items()},
-        refutations={k: standing.refutation for k, standing in standings.items()},
-        fits={k: _fit(k, {k: poses[k], **near[k]}, diagnostics) for k in sorted(poses)},
+        margins={k: standing.margin for k, (standing, _) in looks.items()},
+        refutations={k: standing.refutation for k, (standing, _) in looks.items()},
+        fits={k: fit for k, (_, fit) in looks.items()},
         conductance=_conductance(graph, component),
     )
 

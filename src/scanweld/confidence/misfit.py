@@ -8,6 +8,7 @@ whole patches lie before or behind each other.
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.buckets import cells_of
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.refinement.surface_terms import SurfaceSource, surface_matches
@@ -65,9 +66,7 @@ def sure_offsets(matches: Matches, patch: float) -> FloatArray:
     """
     if not len(matches):
         return np.zeros(0)
-    cells = np.floor(matches.points / patch).astype(np.int64)
-    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    cell = cell.ravel()
+    cell, count = cells_of(matches.points, patch)
     mean = np.bincount(cell, weights=matches.residuals) / count
     within = float(((matches.residuals - mean[cell]) ** 2).sum())
     noise = np.sqrt(within / max(len(cell) - len(count), 1) / count)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from scanweld.compiled.kernels import njit
 from scanweld.config import ContoursConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import border_vertices
@@ -83,11 +84,25 @@ def near_side(depth: FloatArray, is_background: BoolArray, jump: float) -> BoolA
         is_background: (H, W) pixels without surface that are known to be infinitely far.
         jump: tau_1, in the unit of depth.
     """
-    reach = np.where(np.isfinite(depth), depth, -np.inf)
-    reach[is_background] = np.inf
-    farthest = ndimage.maximum_filter(reach, size=3, mode="constant", cval=-np.inf)
-    with np.errstate(invalid="ignore"):
-        return np.isfinite(depth) & (farthest - depth > jump)
+    return _near_side(np.array(depth), np.array(is_background), jump)
+
+
+@njit(cache=True, nogil=True)
+def _near_side(
+    depth: FloatArray, is_background: BoolArray, jump: float
+) -> BoolArray:  # pragma: no cover - compiled
+    height, width = depth.shape
+    found = np.zeros((height, width), np.bool_)
+    for v in range(height):
+        for u in range(width):
+            if not np.isfinite(depth[v, u]):
+                continue
+            for y in range(max(v - 1, 0), min(v + 2, height)):
+                for x in range(max(u - 1, 0), min(u + 2, width)):
+                    is_farther = np.isfinite(depth[y, x]) and depth[y, x] - depth[v, u] > jump
+                    if is_background[y, x] or is_farther:
+                        found[v, u] = True
+    return found
 
 
 def far_side(depth: FloatArray, jump: float) -> BoolArray:

@@ -10,8 +10,8 @@ from scanweld.evidence.evidence import Evidence
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.patches import PixelConsensus, pixel_consensus
 from scanweld.evidence.pixels import see
-from scanweld.evidence.sample_patches import violating_patches, with_patches
-from scanweld.evidence.visibility import evidence_at_poses, mean_evidence
+from scanweld.evidence.sample_patches import violating_patches
+from scanweld.evidence.visibility import AGREE, evidence_of, evidence_shares, pose_rows
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 
@@ -82,14 +82,19 @@ class Judge:
 
     def poses(self, i: int, j: int, i_from_j: Sequence[Pose]) -> list[Evidence]:
         """The same at several poses, in one call of the kernel."""
-        both = evidence_at_poses(
-            self.fields[i], self.fields[j], i_from_j, self.tolerance, NUM_JUDGED_SAMPLES
+        a, b = self.fields[i], self.fields[j]
+        both = evidence_shares(a, b, pose_rows(i_from_j), self.tolerance, NUM_JUDGED_SAMPLES)
+        patches = violating_patches(a, b, i_from_j, self.tolerance)
+        mean = 0.5 * (both[:, 0] + both[:, 1])
+        return [evidence_of(*told) for told in zip(mean.tolist(), patches.tolist(), strict=True)]
+
+    def agree(self, i: int, j: int, i_from_j: Pose) -> float:
+        """Share of samples that agree at a pose, as ``pair`` says: for half of its price."""
+        both = evidence_shares(
+            *(self.fields[i], self.fields[j], pose_rows([i_from_j])),
+            *(self.tolerance, NUM_JUDGED_SAMPLES),
         )
-        patches = violating_patches(self.fields[i], self.fields[j], i_from_j, self.tolerance)
-        return [
-            with_patches(mean_evidence(*directions), patch)
-            for directions, patch in zip(both, patches, strict=True)
-        ]
+        return float(0.5 * (both[0, 0, AGREE] + both[0, 1, AGREE]))
 
     def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
         """The same, samples before the edges of what the other sensor saw being unknown."""

@@ -59,10 +59,16 @@ def evidence_at_poses(
     max_samples: int = 10**9,
 ) -> list[tuple[Evidence, Evidence]]:
     """The same at several poses, in one call of the kernel."""
-    counts = count_evidence(
-        *kernel_view(i), *kernel_view(j), pose_rows(i_from_j), max_samples, tolerance
-    )
-    return [(_evidence(of_i), _evidence(of_j)) for of_i, of_j in counts]
+    shares = evidence_shares(i, j, pose_rows(i_from_j), tolerance, max_samples)
+    return [(evidence_of(of_i), evidence_of(of_j)) for of_i, of_j in shares.tolist()]
+
+
+def evidence_shares(
+    i: ScanField, j: ScanField, rows: FloatArray, tolerance: float, max_samples: int = 10**9
+) -> FloatArray:
+    """Shares (P, 2, 8) of each kind, of i's samples and of j's, at pose rows (P, 12)."""
+    counts = count_evidence(*kernel_view(i), *kernel_view(j), rows, max_samples, tolerance)
+    return counts / np.maximum(counts.sum(axis=2, keepdims=True), 1)
 
 
 def mean_evidence(a: Evidence, b: Evidence) -> Evidence:
@@ -73,9 +79,10 @@ def mean_evidence(a: Evidence, b: Evidence) -> Evidence:
 
 def pose_rows(poses: Sequence[Pose]) -> FloatArray:
     """Poses as rows (N, 12) of a kernel: the rotation row by row, then the translation."""
-    return np.array([np.r_[pose.rotation.ravel(), pose.translation] for pose in poses]).reshape(
-        -1, 12
-    )
+    rows = np.empty((len(poses), 12))
+    for row, pose in zip(rows, poses, strict=True):
+        row[:9], row[9:] = pose.rotation.ravel(), pose.translation
+    return rows
 
 
 def kernel_view(
@@ -85,16 +92,19 @@ def kernel_view(
     return field.camera, field.raster, field.points, field.normals
 
 
-def _evidence(counts: NDArray[np.int64]) -> Evidence:
-    share = counts / max(int(counts.sum()), 1)
+def evidence_of(shares: Sequence[float], patches: Sequence[float] = (0.0, 0.0)) -> Evidence:
+    """Shares (8,) of the kinds, and the two patches, as a record."""
+    front_patch, free_patch = patches
     return Evidence(
-        agree=float(share[AGREE]),
-        front=float(share[FRONT]),
-        contradict=float(share[CONTRADICT]),
-        free=float(share[FREE]),
-        grazing=float(share[GRAZING]),
-        occluded=float(share[OCCLUDED]),
-        unknown=float(share[UNKNOWN]),
+        agree=shares[AGREE],
+        front=shares[FRONT],
+        contradict=shares[CONTRADICT],
+        free=shares[FREE],
+        grazing=shares[GRAZING],
+        occluded=shares[OCCLUDED],
+        unknown=shares[UNKNOWN],
+        front_patch=front_patch,
+        free_patch=free_patch,
     )
 
 

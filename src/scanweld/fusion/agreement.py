@@ -9,10 +9,14 @@ from scanweld.fusion.posed_image import PosedImage
 from scanweld.fusion.sampling import sample_surface
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS
+from scanweld.work.threads import map_in_order
 
 _PRIOR_SCANS = 4.0
 """The scans' overall noise counts like the scatter of so many scans at a vertex: of two or three
 scans alone the scatter would be known too poorly."""
+
+PART = 1 << 14
+"""Vertices that are worked on together: bounds the memory, and is a worker's share."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -29,7 +33,11 @@ class Agreement:
 
 
 def measure_agreement(
-    images: Sequence[PosedImage], vertices: FloatArray, normals: FloatArray, voxel: float
+    images: Sequence[PosedImage],
+    vertices: FloatArray,
+    normals: FloatArray,
+    voxel: float,
+    workers: int = 1,
 ) -> Agreement:
     """Compare vertices with the scans that they were fused from.
 
@@ -41,7 +49,27 @@ def measure_agreement(
         vertices: (V, 3), world frame.
         normals: (V, 3) unit, pointing out.
         voxel: Edge of a voxel.
+        workers: Threads; the result is the same for any number.
     """
+
+    def work(part: slice) -> Agreement:
+        return _agreement(images, vertices[part], normals[part], voxel)
+
+    parts = [*map_in_order(work, parts_of(len(vertices)), workers)]
+    return Agreement(
+        count=np.concatenate([part.count for part in parts]),
+        stdev=np.concatenate([part.stdev for part in parts]),
+    )
+
+
+def parts_of(size: int) -> list[slice]:
+    """Vertices that are worked on together; one part at least."""
+    return [slice(start, start + PART) for start in range(0, max(size, 1), PART)]
+
+
+def _agreement(
+    images: Sequence[PosedImage], vertices: FloatArray, normals: FloatArray, voxel: float
+) -> Agreement:
     size = len(vertices)
     count, total, squares, scatter = (np.zeros(size) for _ in range(4))
     for image in images:

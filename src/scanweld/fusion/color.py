@@ -7,11 +7,13 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import KDTree
 
+from scanweld.fusion.agreement import parts_of
 from scanweld.fusion.noise import MIN_COMMON
 from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import sample_colors, sample_surface
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.mesh import UNCOLORED
+from scanweld.work.threads import map_in_order
 
 logger = logging.getLogger(__name__)
 
@@ -26,7 +28,11 @@ _RIDGE = 1e-3
 
 
 def blend_colors(
-    vertices: FloatArray, normals: FloatArray, images: Sequence[PosedImage], reach: float
+    vertices: FloatArray,
+    normals: FloatArray,
+    images: Sequence[PosedImage],
+    reach: float,
+    workers: int = 1,
 ) -> ByteArray | None:
     """Colours (V, 3) of vertices (V, 3) with unit normals (V, 3); None if no scan has colours.
 
@@ -38,16 +44,18 @@ def blend_colors(
         normals: Unit, pointing out.
         images: With or without colours.
         reach: How far from a vertex a scan's surface may lie, in the scans' unit.
+        workers: Threads; the result is the same for any number.
     """
     colored = [image for image in images if image.colors is not None]
     if not colored:
         return None
     gains = exposure_gains(vertices, normals, colored, reach)
-    total, weight = np.zeros((len(vertices), 3)), np.zeros(len(vertices))
-    for image, gain in zip(colored, gains, strict=True):
-        color, share = _colors_at(image, vertices, normals, reach)
-        total += share[:, None] * color / gain
-        weight += share
+
+    def work(part: slice) -> tuple[FloatArray, FloatArray]:
+        return _sums(vertices[part], normals[part], colored, gains, reach)
+
+    sums = [*map_in_order(work, parts_of(len(vertices)), workers)]
+    total, weight = (np.concatenate(each) for each in zip(*sums, strict=True))
     has_color = weight > 0
     color = np.full((len(vertices), 3), float(UNCOLORED))
     color[has_color] = total[has_color] / weight[has_color, None]
@@ -55,6 +63,22 @@ def blend_colors(
         _, nearest = KDTree(vertices[has_color]).query(vertices[~has_color])
         color[~has_color] = color[has_color][nearest]
     return np.clip(np.rint(color), 0, 255).astype(np.uint8)
+
+
+def _sums(
+    vertices: FloatArray,
+    normals: FloatArray,
+    images: Sequence[PosedImage],
+    gains: FloatArray,
+    reach: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Weighted sums (V, 3) of the colours, balanced, and of the weights (V,)."""
+    total, weight = np.zeros((len(vertices), 3)), np.zeros(len(vertices))
+    for image, gain in zip(images, gains, strict=True):
+        color, share = _colors_at(image, vertices, normals, reach)
+        total += share[:, None] * color / gain
+        weight += share
+    return total, weight
 
 
 def exposure_gains(

@@ -88,7 +88,7 @@ def fuse(
     if config.faces is not None:
         vertices, faces, filled = decimated(vertices, faces, filled, config.faces)
     logger.debug("fused %d scans into %d faces", len(scans), len(faces))
-    return _with_attributes(vertices, faces, filled, images, voxel)
+    return _with_attributes(vertices, faces, filled, images, voxel, workers)
 
 
 def _images(
@@ -115,7 +115,8 @@ def _images(
     ]
     trusts = free_space_trusts(images)
     return with_noise(
-        [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)]
+        [replace(image, trust=float(t)) for image, t in zip(images, trusts, strict=True)],
+        stages.workers,
     )
 
 
@@ -132,7 +133,7 @@ def _surface(
         closing = "fill"
     if closing == "open":
         vertices, faces = extract_surface(volume)
-        vertices, faces = _seen_part(vertices, faces, images, volume.voxel)
+        vertices, faces = _seen_part(vertices, faces, images, volume.voxel, workers)
         filled = np.zeros(len(vertices), dtype=bool)
     else:
         field = closed_field(volume, images, closing, depth, workers)
@@ -149,11 +150,15 @@ def _surface(
 
 
 def _seen_part(
-    vertices: FloatArray, faces: IntArray, images: Sequence[PosedImage], voxel: float
+    vertices: FloatArray,
+    faces: IntArray,
+    images: Sequence[PosedImage],
+    voxel: float,
+    workers: int,
 ) -> tuple[FloatArray, IntArray]:
     """The part of the surface that scans agree on, as a manifold without double layers."""
     normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
-    agreement = measure_agreement(images, vertices, normals, voxel)
+    agreement = measure_agreement(images, vertices, normals, voxel, workers)
     faces = faces[(agreement.count > 0)[faces].all(axis=1)]
     return without_second_sheets(vertices, faces, agreement, voxel)
 
@@ -164,16 +169,17 @@ def _with_attributes(
     filled: BoolArray,
     images: Sequence[PosedImage],
     voxel: float,
+    workers: int,
 ) -> TriangleMesh:
     """The mesh with normals, colours and accuracy of each vertex."""
     normals = smoothed_normals(vertices, faces, NORMAL_ROUNDS)
-    agreement = measure_agreement(images, vertices, normals, voxel)
+    agreement = measure_agreement(images, vertices, normals, voxel, workers)
     filled = filled | (agreement.count == 0)
     return TriangleMesh(
         vertices=vertices,
         faces=faces,
         normals=normals,
-        colors=blend_colors(vertices, normals, images, 2.0 * voxel),
+        colors=blend_colors(vertices, normals, images, 2.0 * voxel, workers),
         support=np.where(filled, 0, agreement.count),
         stdev=np.where(filled, np.nan, agreement.stdev),
         filled=filled,

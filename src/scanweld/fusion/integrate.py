@@ -45,7 +45,7 @@ def integrate(
     Raises:
         InputError: If the scans are spread over more than a million voxels.
     """
-    volume = _allocate(images, voxel, truncation, depth)
+    volume = _allocate(images, voxel, truncation, depth, workers)
     add_images(volume, images, depth, workers)
     return volume
 
@@ -54,7 +54,7 @@ def add_images(
     volume: Volume, images: Sequence[PosedImage], depth: float, workers: int = 1
 ) -> None:
     """Add images to the volume's sums, as ``integrate`` does."""
-    tiles = [_tiles(image, depth) for image in images]
+    tiles = [*map_in_order(lambda image: _tiles(image, depth), images, workers)]
 
     def work(start: int) -> None:
         part = slice(start, start + CHUNK)
@@ -90,9 +90,9 @@ def _tiles(image: PosedImage, depth: float) -> tuple[SingleArray, SingleArray]:
 
 
 def _allocate(
-    images: Sequence[PosedImage], voxel: float, truncation: float, depth: float
+    images: Sequence[PosedImage], voxel: float, truncation: float, depth: float, workers: int
 ) -> Volume:
-    bounds = [(p.min(axis=0), p.max(axis=0)) for p in (i.points() for i in images) if len(p)]
+    bounds = [each for each in map_in_order(_bounds, images, workers) if each is not None]
     if not bounds:
         raise InputError("the scans hold no surface to fuse: every pixel is seen too obliquely")
     low = np.min([low for low, _ in bounds], axis=0)
@@ -103,18 +103,29 @@ def _allocate(
             "voxels: check their poses, or ask for larger voxels"
         )
     origin = low - truncation - (1 + _MARGIN_BLOCKS * BLOCK) * voxel
-    keys = np.zeros(0, np.int64)
-    for image in images:
+    layout = np.array([*origin, voxel, min(truncation, depth + voxel)])
+
+    def keys_of(image: PosedImage) -> IntArray:
         near = _near_surface(
             image.camera.parameters,
             image.depth,
             image.normals,
             image.weight,
             image.sensor_from_world.inverse().matrix(),
-            np.array([*origin, voxel, min(truncation, depth + voxel)]),
+            layout,
         )
-        keys = np.union1d(keys, block_keys(near))
+        return np.unique(block_keys(near))
+
+    keys = np.zeros(0, np.int64)
+    for found in map_in_order(keys_of, images, workers):
+        keys = np.union1d(keys, found)
     return empty_volume(origin, voxel, truncation, blocks_of(keys))
+
+
+def _bounds(image: PosedImage) -> tuple[FloatArray, FloatArray] | None:
+    """Lowest and highest coordinates (3,) of an image's surface; None without one."""
+    points = image.points()
+    return (points.min(axis=0), points.max(axis=0)) if len(points) else None
 
 
 @njit(cache=True, nogil=True)

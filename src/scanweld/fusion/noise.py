@@ -12,6 +12,7 @@ from scanweld.fusion.posed_image import PosedImage
 from scanweld.fusion.sampling import sample_surface
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
+from scanweld.work.threads import map_in_rows
 
 logger = logging.getLogger(__name__)
 
@@ -34,13 +35,13 @@ _GOLDEN = (0.7548776662466927, 0.5698402909980532)
 """Steps of a sequence that fills the unit square evenly (Roberts 2018)."""
 
 
-def with_noise(images: Sequence[PosedImage]) -> list[PosedImage]:
+def with_noise(images: Sequence[PosedImage], workers: int = 1) -> list[PosedImage]:
     """The images with their noise, and the precision that follows from it.
 
     A weight tells how much is known of a patch of surface: the number of pixels on it over their
     variance. The median scan has a precision of 1.
     """
-    noise = scan_noise(images)
+    noise = scan_noise(images, workers)
     pixel = np.array([image.pixel for image in images])
     precision = 1.0 / (noise * pixel) ** 2
     precision = np.clip(precision / np.median(precision), 1.0 / _MAX_PRECISION, _MAX_PRECISION)
@@ -51,7 +52,7 @@ def with_noise(images: Sequence[PosedImage]) -> list[PosedImage]:
     ]
 
 
-def scan_noise(images: Sequence[PosedImage]) -> FloatArray:
+def scan_noise(images: Sequence[PosedImage], workers: int = 1) -> FloatArray:
     """Standard deviation (N,) of each image's surface along its normal, between pixels.
 
     The variance of the distance between two surfaces is the sum of theirs: all pairs together give
@@ -61,8 +62,9 @@ def scan_noise(images: Sequence[PosedImage]) -> FloatArray:
     points = [_between_pixels(image) for image in images]
     floor = np.array([_FLOOR_PIXELS * image.pixel for image in images])
     rows, variances, counts = [], [], []
-    for i, j in permutations(range(len(images)), 2):
-        spread, count = _spread(points[i], images[j])
+    ways = [*permutations(range(len(images)), 2)]
+    spreads = map_in_rows(lambda way: _spread(points[way[0]], images[way[1]]), ways, workers)
+    for (i, j), (spread, count) in zip(ways, spreads, strict=True):
         if count >= MIN_COMMON:
             row = np.zeros(len(images))
             row[[i, j]] = 1.0

@@ -6,6 +6,19 @@ from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 
 
+def cells_of(points: FloatArray, edge: float) -> tuple[IntArray, IntArray]:
+    """Which of the cells with points each of points (N, 3), N > 0, is in, and how many each holds.
+
+    Cells are cubes, numbered in the order of their places.
+    """
+    places = np.floor(points / edge).astype(np.int64)
+    places -= places.min(axis=0)
+    extent = places.max(axis=0) + 1
+    numbers = (places[:, 0] * extent[1] + places[:, 1]) * extent[2] + places[:, 2]
+    _, cell, count = np.unique(numbers, return_inverse=True, return_counts=True)
+    return cell, count
+
+
 @njit(cache=True, nogil=True)
 def into_buckets(points: FloatArray, cube: float) -> tuple[IntArray, IntArray]:  # pragma: no cover
     """Indices (N,) of points (N, 3) sorted by bucket, and where in them each bucket begins.

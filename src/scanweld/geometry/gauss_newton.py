@@ -6,6 +6,7 @@ translation. Both parts are then lengths, so that they compare and one damping f
 
 import numpy as np
 
+from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, rotation_exp
 
@@ -31,8 +32,22 @@ def jacobian(
     points: FloatArray, directions: FloatArray, centre: FloatArray, arm: float
 ) -> FloatArray:
     """Change (N, 6) of the distances of points (N, 3) along directions (N, 3) by a twist."""
-    turns = np.cross(points - centre, directions) / arm
-    return np.concatenate([turns, directions], axis=1)
+    changes = np.empty((len(points), 6))
+    _jacobian(points, directions, centre, arm, changes)
+    return changes
+
+
+@njit(cache=True, nogil=True)
+def _jacobian(
+    points: FloatArray, directions: FloatArray, centre: FloatArray, arm: float, changes: FloatArray
+) -> None:  # pragma: no cover - compiled
+    for n in range(len(points)):
+        x, y, z = points[n, 0] - centre[0], points[n, 1] - centre[1], points[n, 2] - centre[2]
+        a, b, c = directions[n, 0], directions[n, 1], directions[n, 2]
+        changes[n, 0] = (y * c - z * b) / arm
+        changes[n, 1] = (z * a - x * c) / arm
+        changes[n, 2] = (x * b - y * a) / arm
+        changes[n, 3], changes[n, 4], changes[n, 5] = a, b, c
 
 
 def motion_of(twist: FloatArray, centre: FloatArray, arm: float) -> Pose:

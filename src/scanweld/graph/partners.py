@@ -9,19 +9,21 @@ from itertools import combinations
 
 import numpy as np
 
-from scanweld.evidence.judge import PairJudge, Poses
+from scanweld.evidence.judge import Judge, Poses
 from scanweld.graph.view_graph import Edge
+from scanweld.work.threads import map_in_rows
 
 MAX_PARTNERS = 16
 """Partners that each scan chooses; in small components all others are."""
 
 
-def partners(poses: Poses, judge: PairJudge) -> list[Edge]:
+def partners(poses: Poses, judge: Judge, workers: int = 1) -> list[Edge]:
     """Pairs (i, j), i < j, of a component's scans that are compared, in order.
 
     Args:
         poses: ``component_from_sensor`` of its scans.
         judge: Gives the evidence on any pair at any pose.
+        workers: Threads.
     """
     scans = sorted(poses)
     edges = list(combinations(scans, 2))
@@ -29,8 +31,11 @@ def partners(poses: Poses, judge: PairJudge) -> list[Edge]:
         return edges
     back = {k: poses[k].inverse() for k in scans}
     shared: dict[int, list[tuple[float, Edge]]] = {k: [] for k in scans}
-    for i, j in edges:
-        agree = judge.pair(i, j, back[i] @ poses[j]).agree
+
+    def agreement(edge: Edge) -> float:
+        return judge.agree(*edge, back[edge[0]] @ poses[edge[1]])
+
+    for (i, j), agree in zip(edges, map_in_rows(agreement, edges, workers), strict=True):
         if agree > 0.0:
             shared[i].append((-agree, (i, j)))
             shared[j].append((-agree, (i, j)))

@@ -25,8 +25,9 @@ from scanweld.published.judged_pose import judge_pose
 from scanweld.published.mm_icc import mm_icc
 
 
-def published_method(scene: Scene, config: Config) -> Method:
-    """The published method for the scans of a run."""
+def published_method(scene: Scene, config: Config, workers: int) -> Method:
+    """The published method for the scans of a run; its joint steps know one thread only."""
+    del workers
     registrar = _PublishedRegistrar(config=config)
 
     def stay(poses: Poses) -> Poses:

@@ -118,7 +118,10 @@ def _asked(
     within = {
         edge: poses[edge[0]].inverse() @ poses[edge[1]]
         for poses in components
-        for edge in {*partners(poses, scene.judge), *(e for e in found if set(e) <= set(poses))}
+        for edge in {
+            *partners(poses, scene.judge, stages.workers),
+            *(e for e in found if set(e) <= set(poses)),
+        }
     }
     tasks = [
         PairTask(edge=edge, asked=within[edge], found=found.get(edge))

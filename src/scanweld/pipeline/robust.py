@@ -17,21 +17,22 @@ NUM_SETTLING_ROUNDS = 3
 """Rounds of refinement of a component that grows, so that chains of pairs do not drift."""
 
 
-def robust_method(scene: Scene, config: Config) -> Method:
-    """The robust method for the scans of a run."""
+def robust_method(scene: Scene, config: Config, workers: int) -> Method:
+    """The robust method for the scans of a run, by some threads."""
     scans = scene.intake.prepared
     contours = contour_matcher(scans, config.contours)
     registrar = PairRegistrar(config=config)
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
     def settle(poses: Poses) -> Poses:
-        return refine_poses(scans, poses, partners(poses, scene.judge), settling).poses
+        compared = partners(poses, scene.judge, workers)
+        return refine_poses(scans, poses, compared, settling, workers=workers).poses
 
     def refine(
         poses: Mapping[int, Pose], accepted: Sequence[Edge], compared: Sequence[Edge]
     ) -> Refined:
         del accepted
-        refined = refine_poses(scans, poses, compared, config.refine, contours)
+        refined = refine_poses(scans, poses, compared, config.refine, contours, workers)
         return refined.poses, scan_rms(refined)
 
     return Method(

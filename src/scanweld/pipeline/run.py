@@ -89,7 +89,7 @@ def reconstruct(intake: Intake, config: Config, stages: Stages) -> Reconstructio
         stages: Bookkeeping of the run.
     """
     scene = Scene(intake=intake, judge=lay_out(intake, config, stages))
-    method = METHODS[config.method](scene, config)
+    method = METHODS[config.method](scene, config, stages.workers)
     registered = register_pairs(scene, method, config, stages)
     registered = as_silhouettes_allow(registered, method, config, stages)
     registered = learnt(registered, config, stages)

@@ -101,7 +101,9 @@ def refine_placed(
         doubts = merged(_standing_doubts(scene, graph), doubts)
         if axis is not None:
             doubts = merged(doubts, off_axis_doubts(graph, axis))
-        graph = replace(graph, doubts=merged(doubts, _scale_doubts(scene.intake, graph)))
+        graph = replace(
+            graph, doubts=merged(doubts, _scale_doubts(scene.intake, graph, stages.workers))
+        )
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     for k, reason in graph.unplaced.items():
@@ -121,19 +123,21 @@ def _standing_doubts(scene: Scene, graph: ViewGraph) -> Doubts:
     return doubt_of(DoubtCode.CAMERA_STOOD, told)
 
 
-def _scale_doubts(intake: Intake, graph: ViewGraph) -> Doubts:
+def _scale_doubts(intake: Intake, graph: ViewGraph, workers: int) -> Doubts:
     """Scans that fit the others better when they are made larger or smaller."""
     told = {
         k: estimate.words()
         for component in graph.components
-        for k, estimate in _scales(intake, graph, component).items()
+        for k, estimate in _scales(intake, graph, component, workers).items()
         if estimate.is_off
     }
     return doubt_of(DoubtCode.SCALE, told)
 
 
-def _scales(intake: Intake, graph: ViewGraph, component: Component) -> dict[int, ScaleEstimate]:
-    return estimate_scales(intake.prepared, component.poses, graph.compared(component))
+def _scales(
+    intake: Intake, graph: ViewGraph, component: Component, workers: int
+) -> dict[int, ScaleEstimate]:
+    return estimate_scales(intake.prepared, component.poses, graph.compared(component), workers)
 
 
 def assess_placed(
@@ -144,7 +148,7 @@ def assess_placed(
         diagnostics = diagnostics_of(
             scene.intake.prepared, scene.judge, scene.known_sensor, config.contours
         )
-        confidence = assess(graph, diagnostics, stored_calibration(), config)
+        confidence = assess(graph, diagnostics, stored_calibration(), config, stages.workers)
         unsure = {
             k: f"its pose is right with a probability of {found.confidence:.0%} only"
             for k, found in confidence.scans.items()

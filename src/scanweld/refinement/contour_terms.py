@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from scanweld.contours.coherence import ContourMatcher, ContourPair
 from scanweld.geometry.pose import Pose
 from scanweld.refinement.least_squares import MIN_MATCHES, Found
+from scanweld.work.threads import map_in_rows
 
 NUM_INNER_ROUNDS = 2
 """Rounds for which a predicted contour is moved along with its scan before it is rendered anew: the
@@ -20,28 +21,32 @@ class Outlines:
 
     Attributes:
         contours: Of all scans.
+        workers: Threads.
     """
 
     contours: ContourMatcher
+    workers: int = 1
     _rounds: int = 0
     _rendered: dict[tuple[int, int], tuple[ContourPair, Pose]] = field(default_factory=dict)
 
     def matches(self, poses: Mapping[int, Pose], surface: Sequence[Found]) -> list[Found]:
         """Contour matches at poses ``world_from_sensor``, given the surface matches there."""
         if self._rounds % NUM_INNER_ROUNDS == 0:
-            self._rendered = {}
-            for pair in _adjacent(surface):
-                for i, j in (pair, pair[::-1]):
-                    j_from_i = poses[j].inverse() @ poses[i]
-                    self._rendered[i, j] = self.contours.pair(i, j, j_from_i), j_from_i
+            ways = [way for i, j in _adjacent(surface) for way in ((i, j), (j, i))]
+            rendered = map_in_rows(lambda way: self._render(*way, poses), ways, self.workers)
+            self._rendered = dict(zip(ways, rendered, strict=True))
         self._rounds += 1
-        found = []
-        for (i, j), (pair, rendered_at) in self._rendered.items():
-            j_from_i = poses[j].inverse() @ poses[i]
-            matches = self.contours.matches(j, pair.moved(j_from_i @ rendered_at.inverse()))
-            if len(matches) >= MIN_MATCHES:
-                found.append((i, j, matches))
-        return found
+        found = map_in_rows(lambda way: self._match(*way, poses), [*self._rendered], self.workers)
+        return [each for each in found if len(each[2]) >= MIN_MATCHES]
+
+    def _render(self, i: int, j: int, poses: Mapping[int, Pose]) -> tuple[ContourPair, Pose]:
+        j_from_i = poses[j].inverse() @ poses[i]
+        return self.contours.pair(i, j, j_from_i), j_from_i
+
+    def _match(self, i: int, j: int, poses: Mapping[int, Pose]) -> Found:
+        pair, rendered_at = self._rendered[i, j]
+        j_from_i = poses[j].inverse() @ poses[i]
+        return i, j, self.contours.matches(j, pair.moved(j_from_i @ rendered_at.inverse()))
 
 
 def _adjacent(surface: Sequence[Found]) -> list[tuple[int, int]]:

@@ -14,6 +14,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.refinement.contour_terms import Outlines
 from scanweld.refinement.least_squares import MIN_MATCHES, Found, Term, move_poses, weighted_terms
 from scanweld.refinement.surface_terms import SurfaceSource, surface_matches, surface_source
+from scanweld.work.threads import map_in_rows
 
 logger = logging.getLogger(__name__)
 
@@ -63,6 +64,7 @@ def refine_poses(
     pairs: Collection[tuple[int, int]],
     config: RefineConfig,
     contours: ContourMatcher | None = None,
+    workers: int = 1,
 ) -> Refinement:
     """Refine all poses together by surface and contour matches.
 
@@ -77,6 +79,7 @@ def refine_poses(
         pairs: Scans that are matched, (i, j) in any order.
         config: Rounds, radii and the weight of the contours.
         contours: Of all scans; without them there is no contour term.
+        workers: Threads; the result is the same for any number.
     """
     poses = dict(sorted(world_from_sensor.items()))
     if len(poses) < 2:
@@ -86,10 +89,10 @@ def refine_poses(
     pixel = float(np.median([scans[k].image.pixel for k in poses]))
     noise = SURFACE_NOISE_DIAMETERS * diameter, OUTLINE_NOISE_PIXELS * pixel
     contour_rounds = NUM_CONTOUR_ROUNDS if config.contour_weight > 0 else 0
-    outlines = None if contours is None else Outlines(contours=contours)
+    outlines = None if contours is None else Outlines(contours=contours, workers=workers)
     step = 0.0
     for n, radius in enumerate(np.geomspace(*config.match_diameters, config.num_rounds)):
-        surface = match_surfaces(sources, poses, pairs, float(radius) * diameter)
+        surface = match_surfaces(sources, poses, pairs, float(radius) * diameter, workers)
         contour: list[Found] = []
         if outlines is not None and n >= config.num_rounds - contour_rounds:
             contour = outlines.matches(poses, surface)
@@ -101,7 +104,7 @@ def refine_poses(
         )
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
-    surface = match_surfaces(sources, poses, pairs, config.match_diameters[1] * diameter)
+    surface = match_surfaces(sources, poses, pairs, config.match_diameters[1] * diameter, workers)
     terms = weighted_terms(surface, [], poses, 0.0, noise)
     rms = _rms(terms)
     logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
@@ -124,14 +127,18 @@ def match_surfaces(
     poses: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
     radius: float,
+    workers: int = 1,
 ) -> list[Found]:
     """Point-to-plane matches of the pairs that touch at their poses, in both directions."""
-    found = []
-    for i, j in sorted({*pairs, *((j, i) for i, j in pairs)}):
-        matches = surface_matches(sources[i], sources[j], poses[j].inverse() @ poses[i], radius)
-        if len(matches) >= MIN_MATCHES:
-            found.append((i, j, matches))
-    return found
+    back = {k: pose.inverse() for k, pose in poses.items()}
+
+    def match(way: tuple[int, int]) -> Found:
+        i, j = way
+        return i, j, surface_matches(sources[i], sources[j], back[j] @ poses[i], radius)
+
+    ways = sorted({*pairs, *((j, i) for i, j in pairs)})
+    found = map_in_rows(match, ways, workers)
+    return [each for each in found if len(each[2]) >= MIN_MATCHES]
 
 
 def _rms(terms: Sequence[Term]) -> float:

@@ -68,6 +68,7 @@ def estimate_scales(
     scans: Sequence[PreparedScan],
     world_from_sensor: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
+    workers: int = 1,
 ) -> dict[int, ScaleEstimate]:
     """Free the scale of every placed scan beside its pose, in a few steps of least squares.
 
@@ -75,6 +76,7 @@ def estimate_scales(
         scans: All scans.
         world_from_sensor: Refined poses of a component's, by index in ``scans``.
         pairs: Scans that are matched, (i, j) in any order.
+        workers: Threads; the result is the same for any number.
 
     Returns:
         Estimates of the scans whose surfaces touch others', by index.
@@ -91,7 +93,7 @@ def estimate_scales(
     for _ in range(NUM_ROUNDS):
         terms.clear()  # those of this round take as much memory
         grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
-        terms = _surface_terms(grown, poses, pairs, diameter)
+        terms = _surface_terms(grown, poses, pairs, diameter, workers)
         order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
         if len(order) < 2:
             return {}
@@ -142,9 +144,7 @@ def _grown(source: SurfaceSource, factor: float) -> SurfaceSource:
     camera = np.array(source.camera)
     if camera[0] != 0.0:
         camera[1:3] /= factor
-    depth = factor * source.depth
-    depth.flags.writeable = False  # as that of scans is: the kernel is then compiled once only
-    return replace(source, points=factor * source.points, depth=depth, camera=camera)
+    return replace(source, points=factor * source.points, stretch=float(factor), camera=camera)
 
 
 def _surface_terms(
@@ -152,8 +152,9 @@ def _surface_terms(
     poses: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
     diameter: float,
+    workers: int,
 ) -> list[Term]:
-    found = match_surfaces(sources, poses, pairs, MATCH_DIAMETERS * diameter)
+    found = match_surfaces(sources, poses, pairs, MATCH_DIAMETERS * diameter, workers)
     noise = SURFACE_NOISE_DIAMETERS * diameter, 1.0
     return weighted_terms(found, [], poses, 0.0, noise)
 
@@ -171,16 +172,16 @@ def _solve(
     for term in terms:
         a, b = place[term.i], place[term.j]
         by_motion = term.jacobian(centre, arm)
-        by_i = np.c_[by_motion, _by_growth(term, centres[term.i])]
-        by_j = -np.c_[by_motion, _by_growth(term, centres[term.j])]
-        weights = term.weights[:, None]
-        normal[a, a] += (weights * by_i).T @ by_i
-        normal[b, b] += (weights * by_j).T @ by_j
-        cross = (weights * by_i).T @ by_j
+        by_i = np.column_stack([by_motion, _by_growth(term, centres[term.i])])
+        by_j = -np.column_stack([by_motion, _by_growth(term, centres[term.j])])
+        weighted_i, weighted_j = (term.weights[:, None] * by for by in (by_i, by_j))
+        normal[a, a] += weighted_i.T @ by_i
+        normal[b, b] += weighted_j.T @ by_j
+        cross = weighted_i.T @ by_j
         normal[a, b] += cross
         normal[b, a] += cross.T
-        gradient[a] += (weights * by_i).T @ term.residuals
-        gradient[b] += (weights * by_j).T @ term.residuals
+        gradient[a] += weighted_i.T @ term.residuals
+        gradient[b] += weighted_j.T @ term.residuals
         square += float(term.weights @ term.residuals**2)
         count += float(term.weights.sum())
     growths = np.arange(unknowns - 1, size, unknowns)

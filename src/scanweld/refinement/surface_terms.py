@@ -25,6 +25,7 @@ class SurfaceSource:
         normals: (N, 3) their unit normals.
         camera: (5,) the camera's parameters.
         depth: (H, W) depths, NaN off the surface.
+        stretch: Depths are this many times what stands there.
         image_normals: (H, W, 3) unit normals.
         is_usable: (H, W) pixels that may be matched: surface, off the rim, not grazing.
     """
@@ -35,6 +36,7 @@ class SurfaceSource:
     depth: FloatArray
     image_normals: FloatArray
     is_usable: BoolArray
+    stretch: float = 1.0
 
 
 def surface_source(scan: PreparedScan, num_points: int) -> SurfaceSource:
@@ -75,23 +77,24 @@ def surface_matches(i: SurfaceSource, j: SurfaceSource, j_from_i: Pose, radius: 
     Returns:
         Matches in the sensor frame of j.
     """
-    moved = j_from_i.apply(i.points)
-    turned = j_from_i.turn(i.normals)
-    directions = np.zeros_like(moved)
-    residuals = np.full(len(moved), np.nan)
-    _closest_planes(
-        moved,
-        turned,
+    points = j_from_i.apply(i.points)
+    directions, residuals = np.empty_like(points), np.empty(len(points))
+    found = _closest_planes(
+        points,
+        i.normals,
+        j_from_i.rotation,
         j.camera,
         j.depth,
+        j.stretch,
         j.image_normals,
         j.is_usable,
         radius,
         directions,
         residuals,
     )
-    found = np.isfinite(residuals)
-    return Matches(points=moved[found], directions=directions[found], residuals=residuals[found])
+    return Matches(
+        points=points[:found], directions=directions[:found], residuals=residuals[:found]
+    )
 
 
 def _even_by_area(areas: FloatArray, num_points: int) -> IntArray:
@@ -107,17 +110,24 @@ def _even_by_area(areas: FloatArray, num_points: int) -> IntArray:
 def _closest_planes(  # pragma: no cover
     points: FloatArray,
     normals: FloatArray,
+    j_from_i: FloatArray,
     camera: FloatArray,
     depth: FloatArray,
+    stretch: float,
     image_normals: FloatArray,
     is_usable: BoolArray,
     radius: float,
     directions: FloatArray,
     residuals: FloatArray,
-) -> None:
-    """Walk: project the point, drop its foot on the plane seen there, project the foot, ..."""
+) -> int:
+    """Walk: project the point, drop its foot on the plane seen there, project the foot, ...
+
+    What matches is moved to the front of the points (in j's frame; normals are in i's), with its
+    directions and residuals; their number is given back.
+    """
     height, width = depth.shape
     is_pinhole = camera[0] == 0.0
+    r, found = j_from_i, 0
     for n in range(points.shape[0]):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
         fx, fy, fz = x, y, z
@@ -133,7 +143,7 @@ def _closest_planes(  # pragma: no cover
             if u < 0 or v < 0 or u >= width or v >= height or not is_usable[v, u]:
                 distance = np.nan
                 break
-            qz = depth[v, u]
+            qz = stretch * depth[v, u]
             scale = qz if is_pinhole else 1.0
             qx = (u - camera[3]) / camera[1] * scale
             qy = (v - camera[4]) / camera[2] * scale
@@ -142,8 +152,15 @@ def _closest_planes(  # pragma: no cover
             fx, fy, fz = x - distance * a, y - distance * b, z - distance * c
         if np.isnan(distance):
             continue
-        apart = (x - qx) ** 2 + (y - qy) ** 2 + (z - qz) ** 2
-        agreement = a * normals[n, 0] + b * normals[n, 1] + c * normals[n, 2]
-        if apart <= radius * radius and agreement >= MIN_AGREEMENT:
-            directions[n, 0], directions[n, 1], directions[n, 2] = a, b, c
-            residuals[n] = distance
+        if not (x - qx) ** 2 + (y - qy) ** 2 + (z - qz) ** 2 <= radius * radius:
+            continue
+        p, q, s = normals[n, 0], normals[n, 1], normals[n, 2]
+        agreement = a * (r[0, 0] * p + r[0, 1] * q + r[0, 2] * s)
+        agreement += b * (r[1, 0] * p + r[1, 1] * q + r[1, 2] * s)
+        agreement += c * (r[2, 0] * p + r[2, 1] * q + r[2, 2] * s)
+        if agreement >= MIN_AGREEMENT:
+            points[found, 0], points[found, 1], points[found, 2] = x, y, z
+            directions[found, 0], directions[found, 1], directions[found, 2] = a, b, c
+            residuals[found] = distance
+            found += 1
+    return found

@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.buckets import cells_of
 from scanweld.geometry.gauss_newton import jacobian, lever_arm
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
@@ -29,6 +30,7 @@ def pose_deviations(
     world_from_sensor: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
     sensor: SensorModel,
+    workers: int = 1,
 ) -> dict[int, PoseTolerance]:
     """Standard deviations of the pose of each scan of a component, over all directions.
 
@@ -39,11 +41,12 @@ def pose_deviations(
         world_from_sensor: Poses of the component's scans.
         pairs: Scans that are compared, (i, j) in any order.
         sensor: What is known of the sensor.
+        workers: Threads.
     """
     diameter = sensor.diameter
     order = sorted(world_from_sensor)
     radius = max(MATCH_SIGMAS * sensor.sigma, 0.006 * diameter)
-    found = match_surfaces(sources, world_from_sensor, pairs, radius)
+    found = match_surfaces(sources, world_from_sensor, pairs, radius, workers)
     middles = {k: world_from_sensor[k].apply(_middle(sources[k])) for k in order}
     covariance = _covariance(found, order, world_from_sensor, middles, sensor)
     arm = lever_arm(diameter)
@@ -97,9 +100,8 @@ def _weights(points: FloatArray, sensor: SensorModel, patch: float) -> FloatArra
 
     Matches come from both sides of a pair and say the same twice: each counts half.
     """
-    cells = np.floor(points / patch).astype(np.int64)
-    _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    shared = count[cell.ravel()] * sensor.correlated**2
+    cell, count = cells_of(points, patch)
+    shared = count[cell] * sensor.correlated**2
     return 0.5 / np.maximum(sensor.white**2 + shared, np.finfo(float).tiny)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.information import two_way_matches
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.buckets import cells_of
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.certain import Edge, certain_pairs
@@ -107,11 +108,9 @@ def _parts(
     within, freedom, means = 0.0, 0, []
     for residuals, points in found:
         kept = np.abs(residuals) <= 4.0 * sigma
-        residuals, cells = residuals[kept], np.floor(points[kept] / patch).astype(np.int64)
-        if len(residuals) == 0:
+        if not kept.any():
             continue
-        _, cell, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-        cell = cell.ravel()
+        residuals, (cell, count) = residuals[kept], cells_of(points[kept], patch)
         mean = np.bincount(cell, weights=residuals) / count
         within += float(((residuals - mean[cell]) ** 2).sum())
         freedom += len(residuals) - len(count)

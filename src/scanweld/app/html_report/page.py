@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, FileSystemBytecodeCache, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from scanweld.app.html_report import numbers
@@ -33,6 +33,7 @@ from scanweld.app.html_report.view_graph import draw_graph, pair_level
 from scanweld.app.model_files import PairEntry
 from scanweld.app.model_folder import ModelFolder
 from scanweld.app.summary import verdict_sentence
+from scanweld.compiled.kernels import kept_folder
 from scanweld.config import Config
 from scanweld.geometry.scan import RangeScan
 from scanweld.geometry.shading import Side
@@ -68,6 +69,7 @@ def report_page(
     sources: Sources | None,
     config: Config,
     scans: Mapping[str, RangeScan],
+    workers: int = 1,
 ) -> str:
     """The whole page as HTML.
 
@@ -76,6 +78,7 @@ def report_page(
         sources: The scans; None leaves out what only they can tell.
         config: Settings of the run.
         scans: By name, as they were read, for pictures of what was cut off them and of colours.
+        workers: Threads; the page is the same for any number.
     """
     cuts = cut_pictures(model.report.scans, scans)
     looks = scan_looks(list(model.report.scans))
@@ -83,6 +86,7 @@ def report_page(
     diameter = float(np.median(sizes)) if sizes else None
     environment = Environment(
         loader=PackageLoader("scanweld.app.html_report"),
+        bytecode_cache=FileSystemBytecodeCache(str(kept_folder())),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -109,7 +113,7 @@ def report_page(
         diameter=diameter,
         **_outcome(model),
         **_graph(model, looks),
-        **_surface(model, sources, looks),
+        **_surface(model, sources, looks, workers),
         cuts=cuts,
         photos=color_pictures({*model.poses.poses, *cuts}, scans),
         overlays=_overlays(model, sources, config),
@@ -210,7 +214,7 @@ def pair_words(pair: PairEntry) -> str:
 
 
 def _surface(
-    model: ModelFolder, sources: Sources | None, looks: Mapping[str, ScanLook]
+    model: ModelFolder, sources: Sources | None, looks: Mapping[str, ScanLook], workers: int
 ) -> dict[str, Any]:
     """Pictures, the 3D view, residuals, support and holes."""
     mesh = model.mesh
@@ -222,7 +226,7 @@ def _surface(
     borders = open_borders(mesh)
     scene = make_scene(mesh, borders, check)
     shown = [] if check is None else list(check.points)
-    sides = sides_of(scene.mesh, orientation)
+    sides = sides_of(scene.mesh, orientation, workers)
     described, buffers = payload(scene, orientation, [looks[name].color for name in shown])
     return {
         "model": {
@@ -230,24 +234,29 @@ def _surface(
             "faces": len(mesh.faces),
             "num_scans": len(model.fused_scans),
             "shown_faces": len(scene.mesh.faces),
-            "sides": stills(sides, AROUND, scene.mesh.colors, "The model from"),
+            "sides": stills(sides, AROUND, scene.mesh.colors, "The model from", workers),
             "borders": borders,
             "scene": described,
             "buffers": buffers,
             "shown_scans": shown,
         },
-        "check": None if check is None else _measured(model, check, scene, sides),
+        "check": None if check is None else _measured(model, check, scene, sides, workers),
     }
 
 
 def _measured(
-    model: ModelFolder, check: SurfaceCheck, scene: Scene, sides: Mapping[str, Side]
+    model: ModelFolder,
+    check: SurfaceCheck,
+    scene: Scene,
+    sides: Mapping[str, Side],
+    workers: int,
 ) -> dict[str, Any] | None:
     """Residuals and support in numbers and pictures; None where the scans miss the model."""
     found = histogram(check.all_distances())
     residual, support = scene.residual_colors(), scene.support_colors()
     if found is None or model.mesh is None or residual is None or support is None:
         return None
+    colored = "The model coloured by"
     per_scan = {name: histogram(np.sort(np.abs(part))) for name, part in check.distances.items()}
     return {
         "histogram": found,
@@ -257,8 +266,8 @@ def _measured(
         "residual_end": scene.residual_end,
         "residual_stops": RESIDUAL_STOPS,
         "support_stops": SUPPORT_STOPS,
-        "heat": stills(sides, FACES[:2], residual, "The model coloured by residual, seen from"),
-        "support": stills(sides, FACES, support, "The model coloured by support, seen from"),
+        "heat": stills(sides, FACES[:2], residual, f"{colored} residual, seen from", workers),
+        "support": stills(sides, FACES, support, f"{colored} support, seen from", workers),
     }
 
 

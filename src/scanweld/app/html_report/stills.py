@@ -8,6 +8,7 @@ from scanweld.app.html_report.orientation import Orientation
 from scanweld.geometry.arrays import ByteArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.shading import Side, png_bytes, seen_from
+from scanweld.work.threads import map_in_order
 
 PIXELS = 440
 """Longer side of a picture."""
@@ -26,7 +27,7 @@ class Still:
     height: int
 
 
-def sides_of(mesh: TriangleMesh, orientation: Orientation) -> dict[str, Side]:
+def sides_of(mesh: TriangleMesh, orientation: Orientation, workers: int = 1) -> dict[str, Side]:
     """The model from all sides, as the reference scan's sensor is the front."""
     front, up = orientation.front, orientation.up
     views = {
@@ -36,14 +37,23 @@ def sides_of(mesh: TriangleMesh, orientation: Orientation) -> dict[str, Side]:
         "behind": (-front, up),
         "below": (-up, front),
     }
-    return {name: seen_from(mesh, *view, PIXELS) for name, view in views.items()}
+    sides = map_in_order(lambda view: seen_from(mesh, *view, PIXELS), [*views.values()], workers)
+    return dict(zip(views, sides, strict=True))
 
 
 def stills(
-    sides: Mapping[str, Side], names: Sequence[str], colors: ByteArray | None, what: str
+    sides: Mapping[str, Side],
+    names: Sequence[str],
+    colors: ByteArray | None,
+    what: str,
+    workers: int = 1,
 ) -> list[Still]:
     """Pictures from some of the sides, in colours (V, 3)."""
-    return [still_of(sides[name].cutout(colors), f"{what} {name}") for name in names]
+
+    def still(name: str) -> Still:
+        return still_of(sides[name].cutout(colors), f"{what} {name}")
+
+    return [*map_in_order(still, names, workers)]
 
 
 def still_of(picture: ByteArray, alt: str) -> Still:

@@ -23,6 +23,7 @@ def write_html_report(
     folder: Path,
     scans: Mapping[str, RangeScan] | None = None,
     result: Reconstruction | None = None,
+    workers: int = 1,
 ) -> Path:
     """Write report.html beside the files that a run wrote: the same files give the same bytes.
 
@@ -32,6 +33,7 @@ def write_html_report(
             support and contours.
         result: What the folder was written from, if that is at hand: then the model is not read
             and no scan is prepared again. The page is the same.
+        workers: Threads; the page is the same for any number.
 
     Returns:
         Path of the page.
@@ -47,7 +49,7 @@ def write_html_report(
     if scans is not None and model.poses.poses:
         sources = Sources(model, scans, config.prepare)
     with single_threaded_algebra():
-        page = report_page(model, sources, config, scans or {})
+        page = report_page(model, sources, config, scans or {}, workers)
     path = folder / "report.html"
     write_whole(path, page.encode("utf-8"))
     logger.debug("%s: %d bytes", path, len(page))
