@@ -17,7 +17,10 @@ _NESTS = (b"[", b"(", b"{", b'{"a":', b"<a>", b"-")
 _BOMB = 2**27
 _BOMB_SHARE = 0.02
 _E57_PAGE = 1024
-_CASTAGNOLI = 0x82F63B78
+_SUMS = np.arange(256, dtype=np.uint32)
+"""What a byte adds to a checksum by Castagnoli's polynomial."""
+for _ in range(8):
+    _SUMS = (_SUMS >> 1) ^ np.where(_SUMS & 1, np.uint32(0x82F63B78), np.uint32(0))
 
 
 def broken_file(name: str, data: bytes, rng: np.random.Generator) -> bytes:
@@ -58,9 +61,7 @@ def _sealed_e57(data: bytes) -> bytes:
     pages = np.frombuffer(data[: count * _E57_PAGE], np.uint8).reshape(count, _E57_PAGE).copy()
     sums = np.full(count, 0xFFFFFFFF, dtype=np.uint32)
     for column in pages[:, :-4].T:
-        sums ^= column
-        for _ in range(8):
-            sums = (sums >> 1) ^ np.where(sums & 1, np.uint32(_CASTAGNOLI), np.uint32(0))
+        sums = (sums >> 8) ^ _SUMS[(sums ^ column) & 255]
     pages[:, -4:] = (~sums).astype(">u4").view(np.uint8).reshape(count, 4)
     return pages.tobytes() + data[count * _E57_PAGE :]
 

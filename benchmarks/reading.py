@@ -1,6 +1,9 @@
 """How fast files of two million points are read, in CPU seconds, and how much memory that takes.
 
-    python -m benchmarks.reading    every binary format; python -m benchmarks.pages writes the table
+    python -m benchmarks.reading                   every binary format
+    python -m benchmarks.reading --files mesh.stl  some of them; the others' records stay
+
+``python -m benchmarks.pages`` writes the table of docs/formats.md.
 
 Each file is read in a process of its own, after a small one, so that compiled code is loaded.
 """
@@ -20,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import fuzz
-from benchmarks.results import DATA, Json, write_results
+from benchmarks.results import DATA, Json, read_results, write_results
 from benchmarks.sample_files import pcd_head
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh
@@ -161,17 +164,20 @@ def over_files(records: Sequence[Json]) -> Json:
 def main() -> int:
     """Measure every file, each in a process of its own; 1 if one takes too long."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.reading", description=__doc__)
+    parser.add_argument("--files", nargs="+", choices=FILES, default=tuple(FILES))
     parser.add_argument("--out", type=Path, default=DATA / "reading.json")
     options = parser.parse_args()
-    records = []
+    records = {}
+    if options.out.is_file():
+        records = {record["name"]: record for record in read_results(options.out)["records"]}
     fork = multiprocessing.get_context("fork")
-    for name in FILES:
+    for name in options.files:
         with tempfile.TemporaryDirectory() as folder, fork.Pool(1, maxtasksperchild=1) as pool:
             pool.apply(_write, (Path(folder) / name,))
-            records.append(pool.apply(measured, (Path(folder) / name,)))
-        print(records[-1], flush=True)
-        write_results(options.out, records)
-    return int(any(record["seconds"] > MOST_SECONDS for record in records))
+            records[name] = pool.apply(measured, (Path(folder) / name,))
+        print(records[name], flush=True)
+        write_results(options.out, [records[name] for name in FILES if name in records])
+    return int(any(record["seconds"] > MOST_SECONDS for record in records.values()))
 
 
 if __name__ == "__main__":

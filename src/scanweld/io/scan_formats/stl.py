@@ -15,6 +15,8 @@ from scanweld.io.text import is_number
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
 _STL_HEAD = 84
+_ZERO = np.float32(0)
+"""Added to minus zero it gives zero, whose bits are others."""
 
 
 def read_stl(path: Path, data: bytes) -> RawScan:
@@ -28,9 +30,9 @@ def read_stl(path: Path, data: bytes) -> RawScan:
     num_facets = int.from_bytes(data[80:_STL_HEAD], "little")
     if len(data) == _STL_HEAD + _STL_FACET.itemsize * num_facets:
         facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEAD)
-        corners = np.ascontiguousarray(facets["corners"]).reshape(-1, 3)
+        corners = (facets["corners"] + _ZERO).reshape(-1, 3)
     elif data.lstrip()[:5].lower() == b"solid" and b"endsolid" in data:
-        corners = _ascii_corners(path, data)
+        corners = _ascii_corners(path, data) + _ZERO
     else:
         raise ReadError(f"{path}: not an STL file, or a truncated one; copy it again")
     if len(corners) % 3:
@@ -54,11 +56,14 @@ def _ascii_corners(path: Path, data: bytes) -> FloatArray:
 
 
 def _merged(corners: NDArray[np.floating]) -> tuple[FloatArray, IntArray]:
-    """Different points in the order of their first appearance, and each corner's index."""
-    corners = corners + corners.dtype.type(0)  # no minus zero
+    """Different points in the order of their first appearance, and each corner's index.
+
+    Args:
+        corners: (N, 3) in single or double precision, without minus zero.
+    """
     table = np.full(1 << (4 * len(corners) // 3 + 1).bit_length(), -1, dtype=np.int32)
     words = corners.view(np.uint32)
-    is_nan = np.asarray(np.isnan(corners).any(axis=1))
+    is_nan = np.asarray(np.isnan(corners[:, 0] + corners[:, 1] + corners[:, 2]))
     first, index = _first_alike(words, is_nan, table)
     return corners[first].astype(np.float64), index
 
