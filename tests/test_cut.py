@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scanweld.cut import CutSet, cut_out, mask_of, mask_text, with_only
+from scanweld.cut.pieces import Pieces, objects_of
 from scanweld.errors import InputError
 from scanweld.evaluation.primitives import box, cylinder
 from scanweld.evaluation.turntable import EXACT, Shots, standing_room, turntable
@@ -164,3 +165,22 @@ def test_a_mask_of_a_thinned_scan_fits_the_whole_one():
 
 def cylinder_scan() -> RangeScan:
     return RangeScan(name="points", points=cylinder().vertices)
+
+
+def test_a_part_that_is_nearer_to_the_middle_is_not_taken_for_the_object():
+    rng = np.random.default_rng(3)
+    cloud = lambda count, size, place: rng.uniform(-size, size, (count, 3)) + place  # noqa: E731
+    pieces = [
+        Pieces(masks=(np.arange(900),), points=(cloud(900, 0.06, (0.0, 0.0, 0.5)),)),
+        Pieces(masks=(np.arange(900),), points=(cloud(900, 0.06, (0.0, 0.0, 0.5)),)),
+        Pieces(
+            masks=(np.arange(900), np.arange(900, 1100)),
+            points=(cloud(900, 0.06, (0.0, 0.0, 0.44)), cloud(200, 0.01, (0.0, 0.0, 0.52))),
+        ),
+    ]
+    assert [len(found) for found in objects_of(pieces)] == [900, 900, 1100]
+    hand = cloud(950, 0.06, (0.4, 0.0, 0.5))
+    pieces[0] = Pieces(
+        masks=(np.arange(950), np.arange(950, 1850)), points=(hand, pieces[0].points[0])
+    )
+    assert [len(found) for found in objects_of(pieces)] == [900, 900, 1100]

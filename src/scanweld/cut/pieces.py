@@ -96,11 +96,18 @@ def objects_of(frames: Sequence[Pieces]) -> list[IntArray]:
 def _object_of(frame: Pieces, middle: FloatArray) -> IntArray:
     if not frame.masks:
         return np.empty(0, dtype=np.int64)
+    rivals = [k for k, mask in enumerate(frame.masks) if len(mask) >= RIVAL * len(frame.masks[0])]
+    # A part of the object may be nearer to the middle than all of it: whole groups are compared.
+    groups = [_together_with(k, frame) for k in rivals]
+    middles = [np.median(np.concatenate([frame.points[k] for k in g]), axis=0) for g in groups]
+    kept = groups[int(np.argmin([np.linalg.norm(own - middle) for own in middles]))]
+    return np.sort(np.concatenate([frame.masks[k] for k in kept]))
+
+
+def _together_with(main: int, frame: Pieces) -> list[int]:
+    """A piece, and those that hang together with it."""
     from scipy.spatial import KDTree
 
-    rivals = [k for k, mask in enumerate(frame.masks) if len(mask) >= RIVAL * len(frame.masks[0])]
-    off = [np.linalg.norm(np.median(frame.points[k], axis=0) - middle) for k in rivals]
-    main = rivals[int(np.argmin(off))]
     size = float(np.linalg.norm(np.ptp(frame.points[main], axis=0)))
     kept, rest = [main], [k for k in range(len(frame.masks)) if k != main]
     for k in kept:  # grows as it is read
@@ -108,4 +115,4 @@ def _object_of(frame: Pieces, middle: FloatArray) -> IntArray:
         near = [m for m in rest if tree.query(frame.points[m])[0].min() <= NEAR_SIZES * size]
         kept += near
         rest = [m for m in rest if m not in near]
-    return np.sort(np.concatenate([frame.masks[k] for k in kept]))
+    return kept
