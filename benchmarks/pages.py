@@ -10,13 +10,23 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks import blocks, depth, fuzz, keypoints, model, pairs, reading, run
+from benchmarks import (
+    blocks,
+    depth,
+    fuzz,
+    keypoints,
+    model,
+    pairs,
+    reading,
+    run,
+    video,
+)
 from benchmarks.results import DATA, DOCS, ROOT, Json, how_measured, read_results, write_file
 from scanweld.io.scan_formats.registry import formats_markdown
 
 PAGES = (
     ROOT / "README.md",
-    *(DOCS / f"{name}.md" for name in ("benchmarks", "model", "formats", "depth")),
+    *(DOCS / f"{name}.md" for name in ("benchmarks", "model", "formats", "depth", "video")),
 )
 USAGE_ERROR = 2
 TABLE_OF_FORMATS = "scan-formats"
@@ -29,6 +39,7 @@ BLOCKS: dict[str, tuple[str, Callable[[Sequence[Json]], Json]]] = {
     "fuzz": ("fuzz", fuzz.by_format),
     "reading": ("reading", reading.over_files),
     "depth": ("depth", depth.by_kind),
+    "video": ("video", video.by_part),
 }
 """Part of a page, and its template -> its results in docs/data, and what sums these up for it."""
 
