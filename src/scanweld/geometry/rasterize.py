@@ -35,7 +35,8 @@ def render_depth(
     face_of = np.full((camera.height, camera.width), -1, dtype=np.int64)
     # Contiguous and writable, whatever came in: the kernel is compiled for one kind. What is so
     # already is not copied: the triangles of two million points take 100 MB.
-    pixels, triangles = (np.require(given, requirements=["C", "W"]) for given in (pixels, faces))
+    pixels = np.require(pixels, requirements=["C", "W"])
+    triangles = np.require(faces, requirements=["C", "W"])
     _fill(pixels, linear, triangles, is_pinhole, image, face_of)
     return (1.0 / image if is_pinhole else image), face_of
 
