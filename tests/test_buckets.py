@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import KDTree
 
-from scanweld.geometry.buckets import are_beside, into_buckets, nearest_within
+from scanweld.geometry.buckets import are_beside, cells_of, into_buckets, nearest_within
 
 
 def test_nearest_points_are_found_wherever_they_are():
@@ -31,3 +31,12 @@ def test_points_with_enough_neighbours():
         found = are_beside(points, *into_buckets(points, 0.5), 0.25, enough)
         np.testing.assert_array_equal(found, apart[:, -1] < 0.25)
         assert 0 < found.sum() < len(points)
+
+
+def test_cells_are_numbered_in_the_order_of_their_places():
+    points = np.random.default_rng(2).normal((-40.0, 7.0, 0.0), 3.0, (500, 3))
+    places = np.floor(points / 1.5).astype(np.int64)
+    _, cell, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    for found, expected in zip(cells_of(points, 1.5), (cell.ravel(), count), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    assert 1 < count.max() < len(count)

@@ -108,6 +108,9 @@ def test_near_and_far_side_of_a_step():
     assert not near_side(depth, nowhere, 1.5).any()
     assert not far_side(depth, 1.5).any()
     assert near_side(depth, nowhere, 0.5).sum() == 6 * 7
+    depth[2:4, 3:5] = np.nan  # unknown: neither near nor behind anything
+    assert not near_side(depth, nowhere, 1.5).any()
+    assert near_side(depth, np.isnan(depth), 1.5).sum() == 12, "all around what is background"
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -134,6 +134,15 @@ def test_shares_never_exceed_the_whole_nor_depend_on_unit_and_order(model: Camer
                 np.testing.assert_allclose(shares(a), shares(b), atol=0.008)
 
 
+def test_a_judge_says_of_many_poses_what_it_says_of_each():
+    pair = creature_pair(60, CameraModel.PINHOLE)
+    judge, poses = pair.judge(), [pair.i_from_j, *random_poses(pair, 5)]
+    said = judge.poses(0, 1, poses)
+    assert said == [judge.pair(0, 1, pose) for pose in poses]
+    assert [each.agree for each in said] == [judge.agree(0, 1, pose) for pose in poses]
+    assert said[0].agree > 0.3 and max(each.free_patch for each in said[1:]) > 0.0
+
+
 def test_the_mean_of_both_directions():
     a = Evidence(agree=0.6, front=0.1, contradict=0.0, free=0.1, occluded=0.2, unknown=0.0)
     b = Evidence(agree=0.2, front=0.0, contradict=0.2, free=0.0, occluded=0.1, unknown=0.5)

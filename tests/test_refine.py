@@ -104,8 +104,10 @@ def test_order_unit_and_frame_do_not_matter():
     a = refine_poses(scans, poses, RING, config)
     assert a.poses[0] is truth[0] and set(a.poses) == set(truth)
     b = refine_poses(scans, dict(reversed(poses.items())), RING[::-1], config)
+    c = refine_poses(scans, poses, RING, config, workers=2)
     for k in poses:
-        assert a.poses[k].matrix().tobytes() == b.poses[k].matrix().tobytes()
+        for other in (b, c):
+            assert a.poses[k].matrix().tobytes() == other.poses[k].matrix().tobytes()
     far = refine_poses(ring(factor=1000.0)[0], start(1.0, 0.01, factor=1000.0), RING, config)
     shrunk = {
         k: Pose(rotation=pose.rotation, translation=pose.translation / 1000.0)

@@ -20,13 +20,16 @@ def frozen(values: ArrayLike, dtype: type[np.generic], shape: tuple[int | None, 
         ValueError: If the shape does not fit.
     """
     array = values if _is_frozen(values, dtype) else np.array(values, dtype=dtype, order="C")
-    fits = array.ndim == len(shape) and all(
-        want is None or want == have for want, have in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
     array.flags.writeable = False
     return array
+
+
+def _fits(has: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(has) == len(wanted) and all(
+        want is None or want == have for want, have in zip(wanted, has, strict=True)
+    )
 
 
 def _is_frozen(values: ArrayLike, dtype: type[np.generic]) -> TypeGuard[NDArray]:
