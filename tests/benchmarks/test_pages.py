@@ -20,7 +20,7 @@ PAPER = DOCS / "paper"
 
 
 @pytest.mark.parametrize(
-    "name", ["../README.md", "benchmarks.md", "model.md", "formats.md", "depth.md"]
+    "name", ["../README.md", "benchmarks.md", "model.md", "formats.md", "depth.md", "video.md"]
 )
 def test_measured_parts_are_those_of_the_results(name: str):
     text = (DOCS / name).read_text(encoding="utf-8")
