@@ -1,4 +1,4 @@
-"""Write the measured parts of README.md, docs/benchmarks.md and docs/model.md anew, from docs/data.
+"""Write the measured parts of README.md and of pages in docs anew, from docs/data.
 
     python -m benchmarks.pages
 
@@ -10,16 +10,17 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from benchmarks import blocks, keypoints, model, pairs, run
+from benchmarks import blocks, keypoints, model, pairs, run, video
 from benchmarks.results import DATA, DOCS, ROOT, Json, how_measured, read_results, write_file
 
-PAGES = (ROOT / "README.md", DOCS / "benchmarks.md", DOCS / "model.md")
+PAGES = (ROOT / "README.md", DOCS / "benchmarks.md", DOCS / "model.md", DOCS / "video.md")
 USAGE_ERROR = 2
 BLOCKS: dict[str, tuple[str, Callable[[Sequence[Json]], Json]]] = {
     **dict.fromkeys(("sets", "sets-in-words"), ("sets", run.over_seeds)),
     **dict.fromkeys(("pairs", "pairs-in-words"), ("pairs", pairs.over_pairs)),
     "keypoints": ("keypoints", keypoints.over_views),
     **dict.fromkeys(("model", "model-rivals", "model-many"), ("model", model.by_kind)),
+    "video": ("video", video.by_part),
 }
 """Part of a page, and its template -> its results in docs/data, and what sums these up for it."""
 

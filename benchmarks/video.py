@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.kept import warn_of_old_calibration
-from benchmarks.results import Json, write_results
+from benchmarks.results import Json, read_results, write_results
 from benchmarks.sets import data_folder
 from benchmarks.surface.surface_distances import surface_distances
 from benchmarks.virtual.bodies import make_body
@@ -37,7 +37,6 @@ from benchmarks.virtual.handheld import (
     together,
 )
 from scanweld.app.video_job import take_video
-from scanweld.config import PairsConfig
 from scanweld.cut.frames import depth_image
 from scanweld.cut.smoothing import trimmed_rms
 from scanweld.geometry.arrays import FloatArray
@@ -57,8 +56,7 @@ from scanweld.work.progress import silent
 from scanweld.work.stage_log import peak_memory_mb
 from scanweld.work.threads import single_threaded_algebra
 
-OBSERVABILITY = PairsConfig().min_observability
-NUM_NOISE, NUM_AROUND = 60, 300
+NUM_NOISE, NUM_AROUND, TURN_DEG = 60, 300, 350.0
 DISTANCE, SIZE = 0.5, 0.2
 """Of the camera from the object, and its largest extent, in metres."""
 
@@ -73,19 +71,29 @@ def main() -> int:
     add("--frames", type=int, default=1000, help="of the long video")
     add("--objects", type=int, default=5, help="how many of them")
     add("--pixels", type=int, default=320, help="width of the objects' frames")
+    add("--turn", type=float, default=TURN_DEG, help="how far around them, in degrees")
     add("--data", type=Path, help="folder of the data")
     add("--workers", type=int, default=2)
     add("--out", type=Path, help="JSON file of all records")
     options = parser.parse_args()
     warn_of_old_calibration()
+    wanted = ["noise"] if options.quick else options.parts
     records: list[Json] = []
-    for part in ["noise"] if options.quick else options.parts:
+    if options.out and options.out.is_file():  # parts may be measured one at a time
+        records = [r for r in read_results(options.out)["records"] if r["part"] not in wanted]
+    for part in wanted:
         for record in parts[part](options):
             records.append({"part": part, **record})
             print(json.dumps(records[-1]), flush=True)
             if options.out:
                 write_results(options.out, records)
     return 0
+
+
+def by_part(records: Sequence[Json]) -> Json:
+    """The records of each part."""
+    parts = ("kitchen", "long", "noise", "objects")
+    return {part: [record for record in records if record["part"] == part] for part in parts}
 
 
 def kitchen(options: argparse.Namespace) -> Iterator[Json]:
@@ -139,7 +147,7 @@ def _long(folder: Path, num_frames: int) -> Json:
         options = DepthOptions(intrinsics=folder / "intrinsics.json")
         files = DepthImages(inputs=[frames], options=options).collect()
         cpu, wall = time.process_time(), time.perf_counter()
-        taken = take_video(files, model, OBSERVABILITY, 1, silent)
+        taken = take_video(files, model, 1, silent)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     return {
         "frames": len(files),
@@ -190,8 +198,8 @@ def _object(kind: str, seed: int, options: argparse.Namespace) -> Json:
     rng, camera = np.random.default_rng([seed, 7]), pinhole(options.pixels)
     body = table_with(make_body(kind, seed).mesh, SIZE, 0.0)
     middle = np.array([0.0, 0.0, 0.4 * SIZE])
-    turns = np.linspace(0.0, 350.0, NUM_AROUND)
-    poses = around(middle, DISTANCE, turns, rng)
+    count = round(NUM_AROUND * options.turn / TURN_DEG)
+    poses = around(middle, DISTANCE, np.linspace(0.0, options.turn, count), rng)
     truth = {f"{k:04d}": pose for k, pose in enumerate(poses)}
     found, log, seconds = _tracked(_simulated(body, truth, camera), camera)
     scans = [_scan(each, camera) for each in found]
@@ -205,6 +213,9 @@ def _object(kind: str, seed: int, options: argparse.Namespace) -> Json:
     mesh = result.mesh or result.preview
     record: Json = {
         "object": f"{kind} {seed}",
+        "frames": count,
+        "pixels": options.pixels,
+        "turn_deg": options.turn,
         "keyframes": len(found),
         "placed": len(result.poses),
         "components": len(result.components),
@@ -238,7 +249,7 @@ def _tracked(
     began, log, kept = time.process_time(), Log(), list(frames)
     with single_threaded_algebra():
         sigma = depth_noise([frame.depth for frame in kept[:: -(-len(kept) // 5)]])
-        found = list(keyframes(kept, camera, sigma, OBSERVABILITY, log))
+        found = list(keyframes(kept, camera, sigma, log))
     return found, log, time.process_time() - began
 
 

@@ -13,7 +13,6 @@ from scanweld.video.records import Fate, Keyframe, Log, VideoFrame
 from tests.videos import (
     CAMERA,
     KINECT,
-    OBSERVABILITY,
     Video,
     along_wall,
     tracked,
@@ -161,7 +160,7 @@ def test_frames_are_asked_for_one_by_one_and_give_the_same_bytes_again():
             yield frame
 
     noise = depth_noise([frame.depth for frame in made.frames[:3]])
-    coming = keyframes(one_by_one(), CAMERA, noise, OBSERVABILITY, Log())
+    coming = keyframes(one_by_one(), CAMERA, noise, Log())
     first = next(coming)
     assert len(asked) < len(made.frames)
     again = [first, *coming]

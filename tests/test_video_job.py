@@ -11,7 +11,7 @@ from scanweld.app.video_job import take_video
 from scanweld.io.depth.capture import DepthImages
 from scanweld.work.progress import Event, StageAdvanced
 from tests.command_line import COARSE, error_line, scanweld
-from tests.videos import OBSERVABILITY, tracked, video, way_around, written
+from tests.videos import tracked, video, way_around, written
 
 
 def test_keyframes_are_the_same_bytes_at_any_worker_count(tmp_path: Path):
@@ -19,7 +19,7 @@ def test_keyframes_are_the_same_bytes_at_any_worker_count(tmp_path: Path):
     frames, events = DepthImages(inputs=[written(made, tmp_path)]).collect(), list[Event]()
     for workers in (1, 3):
         (tmp_path / f"{workers}").mkdir()
-        take_video(frames, tmp_path / f"{workers}", OBSERVABILITY, workers, events.append)
+        take_video(frames, tmp_path / f"{workers}", workers, events.append)
     one, three = ({p.name: p.read_bytes() for p in (tmp_path / n).rglob("*.*")} for n in "13")
     assert one == three and {"video.json", "intrinsics.json", "frame-000.tif"} <= one.keys()
     told = [(e.done, e.total) for e in events if isinstance(e, StageAdvanced)]

@@ -34,7 +34,6 @@ from tests.scenes import small_creature
 CAMERA = pinhole(160)
 KINECT = replace(WIDE_KINECT, eaten=1.0, lost=0.05)
 """A fourth as wide: along edges less is lost."""
-OBSERVABILITY = 2.5e-4
 MIDDLE = np.array([0.0, 0.0, 0.85])
 
 
@@ -90,7 +89,7 @@ def tracked(frames: list[VideoFrame]) -> tuple[list[Keyframe], Log]:
     """Keyframes of frames, and what became of these."""
     log = Log()
     noise = depth_noise([frame.depth for frame in frames[:3]])
-    return list(keyframes(frames, CAMERA, noise, OBSERVABILITY, log)), log
+    return list(keyframes(frames, CAMERA, noise, log)), log
 
 
 def written(made: Video, folder: Path) -> Path:

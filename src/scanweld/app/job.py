@@ -91,7 +91,6 @@ def run_job(
             video = take_video(
                 inputs.collect(),
                 workspace.staging,
-                config.pairs.min_observability,
                 num_workers(workers),
                 progress,
             )

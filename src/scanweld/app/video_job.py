@@ -95,7 +95,6 @@ class TakenVideo:
 def take_video(
     frames: Sequence[Frame],
     folder: Path,
-    min_observability: float,
     workers: int,
     progress: Progress,
 ) -> TakenVideo:
@@ -104,7 +103,6 @@ def take_video(
     Args:
         frames: Two at least.
         folder: Of the model, where ``keyframes`` and ``video.json`` are made.
-        min_observability: Below it a pose slides, see ``PairsConfig``.
         workers: Threads: one tracks, the others read.
         progress: Told of each frame.
 
@@ -118,7 +116,7 @@ def take_video(
     with stages.stage("video") as counts, single_threaded_algebra():
         camera, noise = _sensor(frames)
         read = _frames(frames, camera, workers, unreadable, progress)
-        for keyframe in keyframes(read, camera, noise, min_observability, log):
+        for keyframe in keyframes(read, camera, noise, log):
             files.append(_written(keyframe, frames[0], camera, folder))
             found.append(replace(keyframe, depth=np.empty((0, 0)), count=np.empty((0, 0), int)))
         counts["frames"], counts["keyframes"] = len(frames), len(found)

@@ -10,13 +10,13 @@ DAMPING = 1e-3
 
 
 @njit(cache=True, nogil=True)
-def solve_damped(h: FloatArray, g: FloatArray) -> bool:
+def solve_damped(h: FloatArray, g: FloatArray, damping: float = DAMPING) -> bool:
     """Solve (h + damping) x = -g by Cholesky in place; g becomes x. False if h is not positive."""
     mean = 0.0
     for r in range(6):
         mean += h[r, r] / 6
     for r in range(6):
-        h[r, r] += DAMPING * mean
+        h[r, r] += damping * mean
     for r in range(6):
         for c in range(r + 1):
             total = h[r, c]

@@ -3,17 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scanweld.evidence.information import information_from, observability_of
+from scanweld.evidence.information import information_from
 from scanweld.evidence.slippage import Slide, slippage_of
-from scanweld.geometry.arrays import FloatArray, IntArray
-from scanweld.geometry.gauss_newton import TURN_SCALE
+from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TURN_SCALE
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.scan import principal_diameter
 from scanweld.video.levels import LevelChoice, halvings, planes_of, unit_normals
-from scanweld.video.match import FRONT, MIN_MATCHES, matches, settle
+from scanweld.video.match import FRONT, LEAST_SPREAD, MIN_MATCHES, matches, settle
 from scanweld.video.noise import DepthNoise
 
 ROUNDS = 10, 5, 4
@@ -23,6 +25,8 @@ REACH = 0.04, 0.01
 """Share of the depth up to which pixels match, in the first round and the last: hands move a camera
 by less from one frame to the next, beside where it was heading, and sensors err by up to the last,
 alike in neighbouring pixels."""
+MAX_NORMALS = 10_000
+"""Matches whose normals are asked how firmly they hold a pose, about."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -94,6 +98,14 @@ def target_of(pyramid: Pyramid) -> Target | None:
     return Target(pyramid=pyramid, planes=planes)
 
 
+class Matches(NamedTuple):
+    """What a frame's pixels (H, W) meet on a keyframe, see ``match.matches``."""
+
+    hits: NDArray[np.int32]
+    errors: FloatArray
+    sigmas: FloatArray
+
+
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Alignment:
     """Where a frame lies before a keyframe.
@@ -105,34 +117,33 @@ class Alignment:
         agreement: Of the frame's pixels that the keyframe looks at, and does not look past its
             surface for, the share that lie on it.
         spread: Robust standard deviation of the distances, in units of what noise explains.
-        observability: Of the pose, see ``observability_of``.
-        slide: The surface that slides like what both see; None if the pose is held.
+        slide: The surface that slides like what both see, if the pose may be off by a pixel for
+            that; None if it is held.
     """
 
     keyframe_from_frame: Pose
     overlap: float
     agreement: float
     spread: float
-    observability: float
     slide: Slide | None
 
 
-def align(frame: Pyramid, target: Target, start: Pose, min_observability: float) -> Alignment:
+def align(frame: Pyramid, target: Target, start: Pose) -> Alignment:
     """Lay a frame onto a keyframe.
 
     Args:
         frame: Of the same camera and levels.
         target: The keyframe.
         start: keyframe_from_frame, about.
-        min_observability: Below it a pose slides, see ``PairsConfig``.
     """
     levels = frame.levels
     row = np.concatenate([start.rotation.ravel(), start.translation])
     reaches = np.geomspace(*REACH, len(levels.chosen()) + 1)
-    hits, spread = np.empty((0, 0), np.int32), np.nan
+    found = Matches(*(np.empty((0, 0), kind) for kind in (np.int32, float, float)))
+    spread = np.nan
     for k, level in enumerate(levels.chosen()):
         depth = frame.images[level]
-        hits = np.empty(depth.shape, np.int32)
+        found = Matches(*(np.zeros(depth.shape, kind) for kind in (np.int32, float, float)))
         spread = settle(
             depth,
             target.planes[level],
@@ -142,56 +153,63 @@ def align(frame: Pyramid, target: Target, start: Pose, min_observability: float)
             np.geomspace(reaches[k], reaches[k + 1], ROUNDS[min(k, len(ROUNDS) - 1)]),
             target.centre,
             TURN_SCALE / target.diameter,
-            hits,
-            np.empty(depth.shape),
-            np.empty(depth.shape),
+            *found,
         )
     pose = Pose(rotation=nearest_rotation(row[:9].reshape(3, 3)), translation=row[9:])
-    num_on, num_front = int((hits >= 0).sum()), int((hits == FRONT).sum())
+    num_on, num_front = int((found.hits >= 0).sum()), int((found.hits == FRONT).sum())
     seen = int(np.isfinite(frame.images[levels.finest]).sum())
-    back, information = _both_ways(frame, target, pose)
-    slippage = slippage_of(information, min_observability)
+    overlap = min(num_on / max(seen * target.own_share, 1.0), _share_back(frame, target, pose), 1.0)
     return Alignment(
         keyframe_from_frame=pose,
-        overlap=min(num_on / max(seen * target.own_share, 1.0), back, 1.0),
+        overlap=overlap,
         agreement=num_on / max(num_on + num_front, 1),
         spread=float(spread),
-        observability=observability_of(information),
-        slide=None if slippage is None else slippage.slide,
+        slide=_slide(frame, target, pose, found) if overlap > 0 else None,
     )
 
 
-def _both_ways(frame: Pyramid, target: Target, pose: Pose) -> tuple[float, FloatArray]:
-    """Share of the keyframe's pixels that lie on the frame, and the information (6, 6) of a pose.
-
-    Both by the coarsest images, whose normals have little noise.
-    """
-    level, levels = frame.levels.coarsest, frame.levels
+def _share_back(frame: Pyramid, target: Target, pose: Pose) -> float:
+    """Share of the keyframe's pixels that lie on the frame, by the coarsest images."""
+    level = frame.levels.coarsest
     planes = frame.planes(level)
     own = _share_on(frame, level, planes, Pose.identity())
-    back = _share_on(target.pyramid, level, planes, pose.inverse()) / max(own, 1e-9)
-    hits, errors = _matched(frame, level, target.planes[level], pose)
-    used = (hits >= 0) & np.isfinite(planes[..., 0])
-    points = levels.cameras[level].unproject_image(frame.images[level])[used]
+    return _share_on(target.pyramid, level, planes, pose.inverse()) / max(own, 1e-9)
+
+
+def _slide(frame: Pyramid, target: Target, pose: Pose, found: Matches) -> Slide | None:
+    """What a frame slides like if its pose may be off by a pixel for that, by the finest images.
+
+    Along a motion of which each of n matches has the information i, a pose has the standard
+    deviation s / sqrt(i n), where s is that of a match.
+    """
+    level = frame.levels.finest
+    camera, depth = frame.levels.cameras[level], frame.images[level]
+    planes, on = frame.planes(level), found.hits >= 0
+    used = on & np.isfinite(planes[..., 0])
+    step = max(1, int(np.sqrt(used.sum() / MAX_NORMALS)))
+    used[np.arange(len(used)) % step > 0] = False
+    used[:, np.arange(used.shape[1]) % step > 0] = False
+    points = pose.apply(camera.unproject_image(depth)[used])
     one = pose.turn(unit_normals(planes[used]))
-    other = unit_normals(target.planes[level].reshape(-1, 4)[hits[used]])
-    matched = (pose.apply(points), one, other, errors[used])
-    return back, information_from([matched], target.diameter)[0]
+    other = unit_normals(target.planes[level].reshape(-1, 4)[found.hits[used]])
+    matched = (points, one, other, found.errors[used])
+    information, _, count = information_from([matched], target.diameter)
+    if count < MIN_MATCHES:
+        return Slide.MANY
+    pixel = camera.footprint(float(np.median(depth[on])))
+    deviation = float(np.sqrt(np.median(found.errors[on] ** 2))) * MAD_TO_SIGMA
+    deviation = max(deviation, LEAST_SPREAD * float(np.median(found.sigmas[on])))
+    needed = (SIGNIFICANT_SIGMAS * deviation / pixel) ** 2 / on.sum()
+    largest = max(float(np.linalg.eigvalsh(information)[-1]), np.finfo(float).tiny)
+    slippage = slippage_of(information, needed / largest)
+    return None if slippage is None else slippage.slide
 
 
 def _share_on(source: Pyramid, level: int, planes: FloatArray, pose: Pose) -> float:
-    """Share of an image's pixels that lie on planes (H, W, 4)."""
-    hits, _ = _matched(source, level, planes, pose)
-    return float((hits >= 0).sum() / max(int(np.isfinite(source.images[level]).sum()), 1))
-
-
-def _matched(
-    source: Pyramid, level: int, planes: FloatArray, pose: Pose
-) -> tuple[IntArray, FloatArray]:
-    """What an image's pixels (H, W) meet, moved by a pose, and how far from it they are."""
+    """Share of an image's pixels, moved by a pose, that lie on planes (H, W, 4)."""
     depth, camera = source.images[level], source.levels.cameras[level].parameters
     row = np.concatenate([pose.rotation.ravel(), pose.translation])
-    hits, errors = np.empty(depth.shape, np.int32), np.zeros(depth.shape)
-    noise = source.noise.halved(level).terms
-    matches(depth, planes, camera, row, noise, REACH[1], hits, errors, np.empty(depth.shape))
-    return hits.astype(np.int64), errors
+    hits, noise = np.empty(depth.shape, np.int32), source.noise.halved(level).terms
+    errors, sigmas = np.empty(depth.shape), np.empty(depth.shape)
+    matches(depth, planes, camera, row, noise, REACH[1], hits, errors, sigmas)
+    return float((hits >= 0).sum() / max(int(np.isfinite(depth).sum()), 1))

@@ -26,7 +26,6 @@ def keyframes(
     frames: Iterable[VideoFrame],
     camera: Camera,
     noise: DepthNoise,
-    min_observability: float,
     log: Log,
 ) -> Iterator[Keyframe]:
     """The keyframes of a video, each as soon as it is finished.
@@ -35,7 +34,6 @@ def keyframes(
         frames: In the order of time; each is asked for when the one before is done with.
         camera: Of all of them, a pinhole.
         noise: Of single depths.
-        min_observability: Below it a pose slides, see ``PairsConfig``.
         log: Filled with what becomes of the frames.
     """
     current: Track | None = None
@@ -54,7 +52,7 @@ def keyframes(
                 log.fates[track.first] = Fate.KEYFRAME
                 current, found = track, later
         if isinstance(found, Refusal) or current is None:
-            waiting = Track(frame, camera, noise, min_observability), Refusal(found)
+            waiting = Track(frame, camera, noise), Refusal(found)
             continue
         waiting = None
         if is_far(found):

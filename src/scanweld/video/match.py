@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scanweld.compiled.kernels import njit
 from scanweld.evidence.step import move, solve_damped
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TUKEY
+from scanweld.geometry.gauss_newton import DAMPING, MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TUKEY
 
 OFF_GRID_PIXELS = 0.3
 """Standard deviation of where in its pixel a depth was seen, across the line of sight."""
@@ -194,7 +194,7 @@ def settle(
         accumulate(
             depth, planes, camera, pose, hits, errors, sigmas, spread, centre, turn_scale, h, g
         )
-        if not solve_damped(h, g):
+        if not solve_damped(h, g, DAMPING):
             break
         move(pose, g, centre, turn_scale)
         if np.sqrt((g * g).sum()) < SETTLED * far:

@@ -41,13 +41,10 @@ class Track:
         frame: The first.
         camera: Of all frames.
         noise: Of single depths.
-        min_observability: Below it a pose slides, see ``PairsConfig``.
     """
 
-    def __init__(
-        self, frame: VideoFrame, camera: Camera, noise: DepthNoise, min_observability: float
-    ) -> None:
-        self._camera, self._noise, self._least = camera, noise, min_observability
+    def __init__(self, frame: VideoFrame, camera: Camera, noise: DepthNoise) -> None:
+        self._camera, self._noise = camera, noise
         self._piece_from_keyframe = Pose.identity()
         self._before_from_now = Pose.identity()
         self._spreads: list[float] = []
@@ -61,7 +58,7 @@ class Track:
         pyramid = self._pyramid(frame.depth)
         heading = self._keyframe_from_last @ self._before_from_now
         for start in (heading, self._keyframe_from_last):
-            found = align(pyramid, self._target, start, self._least)
+            found = align(pyramid, self._target, start)
             if found.overlap >= LOST_OVERLAP and found.agreement >= LOST_AGREEMENT:
                 slid = found.slide is not None and is_far(found)
                 return Refusal.SLID if slid else found
