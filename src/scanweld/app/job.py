@@ -80,9 +80,9 @@ def run_job(
     """
     config, known = config or Config(), knowledge or Knowledge()
     video, workers, memory = None, limits.workers, limits.memory
-    if isinstance(inputs, Video):
-        files = inputs.collect()
-    else:
+    frames = inputs.collect() if isinstance(inputs, Video) else None
+    files: Sequence[ScanFile] = frames or ()
+    if not isinstance(inputs, Video):
         files = collect_named(inputs)
         known = _with_layout_poses(known, files)
     paths = [file.path for file in files]
@@ -91,13 +91,8 @@ def run_job(
         Workspace(Path(output), inputs=paths, force=force) as workspace,
         _runner(limits.scheduler) as runner,
     ):
-        if isinstance(inputs, Video):
-            video = take_video(
-                inputs.collect(),
-                workspace.staging,
-                num_workers(workers),
-                progress,
-            )
+        if frames is not None:
+            video = take_video(frames, workspace.staging, num_workers(workers), progress)
             files, paths = video.files, [file.path for file in video.files]
             known = Knowledge(start=video.start).joined(known)
         max_points = None if memory is None else points_within(memory, paths)
