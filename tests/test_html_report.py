@@ -74,7 +74,7 @@ def test_page_is_well_formed_and_needs_nothing_else(made: Made, page: Page):
             assert found["href"][1:] in ids
     assert "@import" not in text and "url(" not in text
     pictures = [found for tag, found in page.elements if tag == "img"]
-    assert len(pictures) == 3 + 2 + 3
+    assert len(pictures) == 3 + 2 + 3 + 4, "four of them show the scans in colour"
     assert all(found["alt"] for found in pictures)
     drawings = [found for tag, found in page.elements if tag in ("svg", "canvas")]
     assert len(drawings) >= 4 and all(found["aria-label"] for found in drawings)
@@ -361,12 +361,12 @@ def test_command_writes_the_page_anew(tmp_path: Path, capsys: pytest.CaptureFixt
     folder = written(tmp_path / "model", result)
     assert command("report", folder, "--scans", scans) == 0
     assert capsys.readouterr().out.strip() == str(folder / "report.html")
-    assert num_pictures(folder) == 8
+    assert num_pictures(folder) == 12
     assert command("report", folder) == 0  # where they are, this folder does not say
     assert num_pictures(folder) == 3
     write_outputs(result, folder, {s.name: Place(file=f"../scans/{s.name}.ply") for s in read})
     assert command("report", folder) == 0
-    assert num_pictures(folder) == 8
+    assert num_pictures(folder) == 12
     assert command("report", folder, "--scans", scans / f"{read[0].name}.ply") == 1
     assert "its file is not among the scans given" in capsys.readouterr().err
     first, second = (scans / f"{scan.name}.ply" for scan in read[:2])
