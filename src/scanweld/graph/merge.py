@@ -52,11 +52,7 @@ class Merge:
 
     @property
     def is_contradicted(self) -> bool:
-        """Whether any single pair across shows that the merge is wrong.
-
-        However many others say the same: of a box whose lid was opened, three good pairs did, all
-        wrong by a quarter turn.
-        """
+        """Whether any single pair across shows that the merge is wrong, whatever others say."""
         return self.worst > MAX_EXCESS
 
     @property
