@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from scanweld.config import PairsConfig, PrepareConfig
+from scanweld.evidence.evidence import PatchLimits
 from scanweld.evidence.field import ScanField, make_field
 from scanweld.evidence.judge import Judge
 from scanweld.geometry.camera import CameraModel
@@ -47,7 +48,7 @@ class PreparedPair:
             fields=self.fields,
             diameter=self.diameter,
             tolerance=tolerance,
-            max_contradiction=PairsConfig().max_contradiction,
+            limits=PatchLimits(contradiction=PairsConfig().max_contradiction),
         )
 
     def off_by(self, i_from_j: Pose) -> tuple[float, float]:

@@ -94,7 +94,7 @@ def test_defaults_then_file_then_overrides_and_no_other_change(
         f"{path}: seed: is ignored, as a run has nothing random"
     ]
     assert config.graph.min_margin == 0.5
-    assert config.graph.max_violated_share == Config().graph.max_violated_share
+    assert config.graph.min_edge_score == Config().graph.min_edge_score
     assert load_config(None) == Config()
     with pytest.raises(ConfigError, match="settings: unit"):
         load_config(None, unit="furlong")

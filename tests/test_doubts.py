@@ -8,7 +8,7 @@ import pytest
 
 from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
-from scanweld.config import GraphConfig
+from scanweld.evidence.evidence import PatchLimits
 from scanweld.graph.doubts import Doubt, DoubtCode, doubt_of, merged
 from scanweld.graph.reasons import find_doubts
 from scanweld.graph.view_graph import Component
@@ -16,6 +16,7 @@ from scanweld.reconstruction import DoubtReport, ScanReport, ScanVerdict
 from tests.results import a_result
 from tests.view_graphs import DrawnJudge, graph_with, seen, world_of
 
+LIMITS = PatchLimits(contradiction=0.1, free=0.05)
 CODES = [
     *("camera_stood", "alone", "moved_part", "violated", "unpaired", "mark_only"),
     *("not_refined", "disagreement", "off_axis", "scale", "inexact", "confidence"),
@@ -53,10 +54,11 @@ def test_a_scan_that_nothing_holds_and_others_see_through_is_doubted_for_both(ag
     graph = graph_with({}, Component(poses=dict(enumerate(world)), reference=0))
     known = doubt_of(DoubtCode.NOT_REFINED, {0: "pulled apart"})
     graph = replace(graph, doubts=known)
-    judge = DrawnJudge(says=lambda i, j, pose: replace(seen(agree), front=0.5 - agree))
+    judge = DrawnJudge(
+        says=lambda i, j, pose: replace(seen(agree), free_patch=0.5 - agree), limits=LIMITS
+    )
     codes = {
-        k: [doubt.code.value for doubt in doubts]
-        for k, doubts in find_doubts(graph, judge, GraphConfig()).items()
+        k: [doubt.code.value for doubt in doubts] for k, doubts in find_doubts(graph, judge).items()
     }
     through = [] if agree else ["violated"]
     assert codes == {0: [*through, "unpaired", "not_refined"], 1: [*through, "unpaired"]}

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 from scanweld.confidence.bounds import Bounds, BoundScale
 from scanweld.config import PrepareConfig
+from scanweld.evidence.evidence import MAX_EXCESS
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
 from scanweld.evidence.sample_patches import violating_patches
 from scanweld.geometry.arrays import FloatArray
@@ -19,6 +21,7 @@ from scanweld.pairs.quick import search_quickly
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION, held_to
 from scanweld.preparation.range_image import make_range_image, natural_pixel
+from scanweld.sensor.closure import closure_displacement
 from scanweld.sensor.learn import learn_sensor
 from scanweld.sensor.model import SensorModel
 from scanweld.sensor.standing import moved_share, standing_scans
@@ -144,6 +147,63 @@ def test_a_pair_is_contradicted_by_the_limit_of_its_set(found: tuple[PreparedPai
     assert held.kind is PairKind.CONTRADICTED and "saw through" in held.reason
     assert held.alternatives == result.alternatives
     assert MAX_CONTRADICTION > 0.25
+
+
+def test_patches_in_free_space_are_held_to_what_certain_pairs_show(
+    found: tuple[PreparedPair, PairResult],
+):
+    """A lid laid on a lid: hardly anything else agrees, and the bodies stand in free space."""
+    pair, result = found
+    assert result.best is not None
+    cut = replace(result.best.evidence, free_patch=0.1)
+    certain = replace(result, alternatives=(replace(result.best, evidence=cut),))
+    through = replace(cut, agree=0.0, front_patch=0.0, free_patch=0.15)
+    honest, trimmed, unknown = (
+        learnt(pair, *results)
+        for results in ((result, result), (result, certain), (replace(result, margin=0.3),))
+    )
+    assert through.excess(honest.limits) > MAX_EXCESS
+    assert through.excess(trimmed.limits) <= MAX_EXCESS and trimmed.max_free_patch == 0.1
+    assert through.excess(unknown.limits) <= 0.0, "without certain pairs nothing is known"
+
+
+@pytest.mark.parametrize("num_scans", [4, 6])
+def test_cycles_tell_how_far_pairs_are_off(found: tuple[PreparedPair, PairResult], num_scans: int):
+    """All pairs good and each off by a shift of its own; one that is wrong is not counted."""
+    pair, result = found
+    field, diameter = pair.fields[0], pair.diameter
+    fields, edges = [field] * num_scans, list(combinations(range(num_scans), 2))
+
+    def closed(share: float, wrong: float = 0.0) -> float:
+        rng = np.random.default_rng(2)
+        pairs = {}
+        for n, (i, j) in enumerate(edges):
+            off = rng.normal(size=3) * share * diameter / np.sqrt(3.0)
+            off[0] += wrong * diameter * (n == 0)
+            best = replace(result.alternatives[0], i_from_j=Pose.exp([0, 0, 0, *off]))
+            pairs[i, j] = replace(result, i=i, j=j, alternatives=(best,))
+        return closure_displacement(pairs, fields, diameter) / diameter
+
+    assert closed(0.0) == 0.0
+    assert closed(0.01) == pytest.approx(0.01, rel=0.6)
+    assert closed(0.02) == pytest.approx(2.0 * closed(0.01))
+    assert closed(0.001, wrong=0.5) < 0.003
+    alone = {(0, 1): result, (1, 2): replace(result, i=1, j=2), (0, 2): replace(result, i=0, j=2)}
+    assert closure_displacement(alone, fields, diameter) == 0.0, "one cycle closes by chance"
+
+
+def test_bent_depth_that_pairs_hide_widens_what_is_compared(
+    found: tuple[PreparedPair, PairResult], monkeypatch: pytest.MonkeyPatch
+):
+    pair, result = found
+    sensor = learnt(pair, result, result)
+    open_cycles = lambda pairs, fields, diameter: 0.01 * diameter  # noqa: E731
+    monkeypatch.setattr("scanweld.sensor.learn.closure_displacement", open_cycles)
+    bent = learnt(pair, result, result)
+    assert bent.sigma > 0.005 * pair.diameter and bent.correlated > sensor.correlated
+    assert "around cycles" in bent.words() and "around cycles" not in sensor.words()
+    assert sensor.tolerance < bent.tolerance <= 0.03 * pair.diameter + 1e-9
+    assert bent.reach > 2.0 * sensor.reach
 
 
 # What stays and what moves.

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanweld.config import GraphConfig
 from scanweld.evaluation.scanner import NoiseModel
 from scanweld.evidence import patches
 from scanweld.evidence.field import ScanField
@@ -181,7 +180,7 @@ def test_what_only_a_feature_holds_is_doubtful():
     def doubts(last: PairResult) -> Doubts:
         both = {**pairs, (2, 3): last}
         graph = graph_with(both, component, accepted=both)
-        return find_doubts(graph, DrawnJudge(says=lambda i, j, pose: seen(0.5)), GraphConfig())
+        return find_doubts(graph, DrawnJudge(says=lambda i, j, pose: seen(0.5)))
 
     assert doubts(pairs[2, 3]) == {}
     assert list(doubts(marked)) == [3] and "mark" in doubts(marked)[3][0].text

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scanweld.config import GraphConfig
-from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.evidence import Evidence, PatchLimits
 from scanweld.evidence.judge import PairJudge, Poses
 from scanweld.evidence.patches import PixelConsensus
 from scanweld.geometry.pose import Pose, random_rotation
@@ -26,6 +26,7 @@ DENIED = Evidence(
 Pairs = dict[Edge, PairResult]
 Say = Callable[[int, int, Pose], Evidence]
 SAME = PoseTolerance(angle_deg=5.0, shift=0.03)
+USUAL_LIMITS = PatchLimits(contradiction=0.1)
 NOWHERE = np.zeros((4, 4), dtype=bool)
 SILENT = PixelConsensus(agrees=NOWHERE, violates=NOWHERE, in_free_space=NOWHERE, max_pixels=1.0)
 
@@ -36,21 +37,17 @@ def nothing_seen(a: Poses, b: Poses) -> list[PixelConsensus]:
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnJudge:
-    """A judge that says what is drawn; off edges the same unless something else is."""
+    """A judge that says what is drawn."""
 
     says: Say
-    says_off_edges: Say | None = None
     sees: Callable[[Poses, Poses], list[PixelConsensus]] = nothing_seen
-    max_contradiction: float = 0.1
+    limits: PatchLimits = USUAL_LIMITS
 
     def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
         return self.says(i, j, i_from_j)
 
     def poses(self, i: int, j: int, i_from_j: Sequence[Pose]) -> list[Evidence]:
         return [self.says(i, j, pose) for pose in i_from_j]
-
-    def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
-        return (self.says_off_edges or self.says)(i, j, i_from_j)
 
     def pixels(self, a: Poses, b: Poses) -> list[PixelConsensus]:
         return self.sees(a, b)
@@ -191,7 +188,7 @@ def graph_of(
 ) -> ViewGraph:
     judge = judge or judge_of(world, pairs)
     graph = build_view_graph(problem_of(len(world), pairs, judge, settle))
-    graph = replace(graph, doubts=find_doubts(graph, judge, GraphConfig()))
+    graph = replace(graph, doubts=find_doubts(graph, judge))
     assert_sound(graph, len(world), pairs)
     return graph
 

@@ -150,12 +150,6 @@ class GraphConfig(Section):
     agree, at most."""
     min_margin: float = Field(default=0.2, ge=0, le=1)
     """Share of its score by which a merge must beat the best distinct one."""
-    max_violated_share: float = Field(default=0.15, ge=0)
-    """Number of samples that the other sensors contradict over the number that agree, above which a
-    merge is refused and a placed scan is doubtful."""
-    max_inner_violated_share: float = Field(default=0.075, ge=0)
-    """The same when a refused merge is judged again after all its scans were refined, without the
-    pixels along depth edges."""
 
 
 class ContoursConfig(Section):

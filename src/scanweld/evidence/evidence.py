@@ -14,10 +14,25 @@ FRONT_PATCH_WEIGHT, FREE_PATCH_WEIGHT = 2.0, 0.5
 inferred. Right poses of cropped and trimmed scans show patches in free space of 0.1 to 0.3 of what
 agrees, but next to none before a surface; wrong ones show both."""
 MAX_EXCESS = 0.03
-"""Share of the samples by which patches before surfaces of a pair, whose place other pairs say, may
-exceed what its set excuses."""
+"""Share of the samples by which patches of a pair, whose place other pairs say, may exceed what its
+set excuses."""
+NO_LIMIT = 1.0
+"""Of patches in free space, where a set does not tell how far its silhouettes can be believed."""
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PatchLimits:
+    """How large the violating patches of right poses are in a set.
+
+    Attributes:
+        contradiction: Both patches over what agrees, weighted as in ``Evidence.contradiction``.
+        free: The patch in free space, as a share of all samples.
+    """
+
+    contradiction: float
+    free: float = NO_LIMIT
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -71,12 +86,21 @@ class Evidence:
         """Patches that violate, as a share of what agrees."""
         return self.patches / max(self.agree, MIN_AGREE)
 
-    def excess(self, max_contradiction: float) -> float:
-        """Share of the samples by which patches before surfaces exceed what a set excuses.
+    def front_excess(self, limits: PatchLimits) -> float:
+        """Share of the samples by which patches before surfaces exceed what a set excuses."""
+        return FRONT_PATCH_WEIGHT * self.front_patch - limits.contradiction * self.agree
 
-        Of silhouettes even right pairs that hardly meet show patches: there they say nothing.
+    def free_excess(self, limits: PatchLimits) -> float:
+        """The same of patches in free space.
+
+        Scans that hardly meet have little that agrees, and yet such patches where silhouettes are
+        cut: these are held to what is seen there at poses that surfaces make sure.
         """
-        return FRONT_PATCH_WEIGHT * self.front_patch - max_contradiction * self.agree
+        return FREE_PATCH_WEIGHT * (self.free_patch - limits.free)
+
+    def excess(self, limits: PatchLimits) -> float:
+        """The larger of both."""
+        return max(self.front_excess(limits), self.free_excess(limits))
 
     @property
     def surface_violation(self) -> float:

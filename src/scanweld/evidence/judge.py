@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-from scanweld.evidence.edges import evidence_off_edges, with_wide_edges
-from scanweld.evidence.evidence import Evidence
+from scanweld.evidence.evidence import Evidence, PatchLimits
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.patches import PixelConsensus, pixel_consensus
 from scanweld.evidence.pixels import see
@@ -26,8 +25,8 @@ class PairJudge(Protocol):
     """What the stages after the pairs ask: how well scans fit at a pose, by index."""
 
     @property
-    def max_contradiction(self) -> float:
-        """Largest patches of violating samples, over what agrees, that the set excuses."""
+    def limits(self) -> PatchLimits:
+        """How large patches of violating samples the set excuses."""
         ...
 
     def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
@@ -36,10 +35,6 @@ class PairJudge(Protocol):
 
     def poses(self, i: int, j: int, i_from_j: Sequence[Pose]) -> list[Evidence]:
         """The same at several poses."""
-        ...
-
-    def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
-        """The same, samples before the edges of what the other sensor saw being unknown."""
         ...
 
     def pixels(self, a: Poses, b: Poses) -> list[PixelConsensus]:
@@ -58,22 +53,18 @@ class Judge:
         fields: The scans, laid out.
         diameter: Diameter of the run, in the scans' unit.
         tolerance: Depth tolerance of the evidence, in the scans' unit.
-        max_contradiction: Largest patches of violating samples, over what agrees, of right poses.
+        limits: How large patches of violating samples the set excuses.
     """
 
     fields: Sequence[ScanField]
     diameter: float
     tolerance: float
-    max_contradiction: float
+    limits: PatchLimits
 
     @cached_property
     def centres(self) -> list[FloatArray]:
         """(3,) middle of each scan's samples, sensor frame."""
         return [field.centre for field in self.fields]
-
-    @cached_property
-    def _with_wide_edges(self) -> dict[int, ScanField]:
-        return {}
 
     def pair(self, i: int, j: int, i_from_j: Pose) -> Evidence:
         """Mean evidence of both directions at a pose between the sensor frames."""
@@ -96,16 +87,6 @@ class Judge:
         )
         return float(0.5 * (both[0, 0, AGREE] + both[0, 1, AGREE]))
 
-    def off_edges(self, i: int, j: int, i_from_j: Pose) -> Evidence:
-        """The same, samples before the edges of what the other sensor saw being unknown."""
-        return evidence_off_edges(
-            (self.fields[i], self._widened(i)),
-            (self.fields[j], self._widened(j)),
-            i_from_j,
-            self.tolerance,
-            NUM_JUDGED_SAMPLES,
-        )
-
     def pixels(self, a: Poses, b: Poses) -> list[PixelConsensus]:
         """What two components' sensors say of all pixels of each other's scans, a's scans first.
 
@@ -118,8 +99,3 @@ class Judge:
         }
         of_a = [pixel_consensus([seen[i, j][0] for j in b], self.tolerance) for i in a]
         return of_a + [pixel_consensus([seen[i, j][1] for i in a], self.tolerance) for j in b]
-
-    def _widened(self, k: int) -> ScanField:
-        if k not in self._with_wide_edges:
-            self._with_wide_edges[k] = with_wide_edges(self.fields[k], self.tolerance)
-        return self._with_wide_edges[k]

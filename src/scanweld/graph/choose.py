@@ -1,13 +1,11 @@
 """Which two components are merged next, and how: as pairs propose it, or after a refinement."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import combinations
 
 from scanweld.config import GraphConfig
 from scanweld.evidence.judge import Poses
-from scanweld.evidence.rivals import margin_over
-from scanweld.graph.merge import Merge, off_edges, without_excluded
+from scanweld.graph.merge import Merge, judged_in_place, without_excluded
 from scanweld.graph.problem import GraphProblem
 
 Excluded = frozenset[tuple[int, int, int]]
@@ -53,18 +51,15 @@ def merged(merge: Merge, a: Poses, b: Poses) -> Poses:
 def _as_proposed(problem: GraphProblem, a: Poses, b: Poses, excluded: Excluded) -> Merge | None:
     """The best way to merge two components, if it passes as it is proposed."""
     merges = without_excluded(excluded, problem.merges(a, b))
-    config = problem.config
-    return merges[0] if merges and _passes(merges[0], config, config.max_violated_share) else None
+    return merges[0] if merges and _passes(merges[0], problem.config) else None
 
 
 def _after_refinement(
     problem: GraphProblem, a: Poses, b: Poses, excluded: Excluded
 ) -> Merge | None:
-    """The best way to merge two components, if it passes once settled, and with edges forgiven.
+    """The best way to merge two components, if it passes once all scans have settled.
 
-    Of noisy scans, two make errors that all the others deny: the pose of one pair is off where it
-    is carried over to those far from it, and samples fall beside edges. So all
-    scans settle first, and edges say nothing; of what is left less may be violated.
+    The pose of one pair is off where it is carried over to scans far from it.
     """
     merges = without_excluded(excluded, problem.merges(a, b))
     if not merges or not _qualifies_for_recheck(merges[0], a, b, problem.config):
@@ -74,15 +69,8 @@ def _after_refinement(
     settled = problem.settled(proposed)
     if not _stayed(problem, proposed, settled):
         return None
-    second = _off_edges(problem, best, a, b, settled)
-    rivals = [
-        _off_edges(problem, merge, a, b, merged(merge, a, b)).score
-        for merge in problem.merges(a, b)
-        if merge.a_from_b is not best.a_from_b
-    ]
-    second = replace(second, margin=min(best.margin, margin_over(second.score, rivals)))
-    passed = _passes(second, problem.config, problem.config.max_inner_violated_share)
-    return second if passed else None
+    second = judged_in_place(best, a, b, settled, problem.judge)
+    return second if _passes(second, problem.config) else None
 
 
 def _qualifies_for_recheck(merge: Merge, a: Poses, b: Poses, config: GraphConfig) -> bool:
@@ -101,23 +89,9 @@ def _stayed(problem: GraphProblem, proposed: Poses, settled: Poses) -> bool:
     )
 
 
-def _off_edges(problem: GraphProblem, merge: Merge, a: Poses, b: Poses, poses: Poses) -> Merge:
-    """The merge as all scans judge it in these poses, edges forgiven."""
-    both = {k: poses[k] for k in a}, {k: poses[k] for k in b}
-    return off_edges(merge, *both, problem.judge)
-
-
-def is_uncontradicted(
-    merge: Merge, config: GraphConfig, max_violated_share: float | None = None
-) -> bool:
-    """Whether neither a pair across nor all of them together speak against a merge."""
-    share = config.max_violated_share if max_violated_share is None else max_violated_share
-    return not merge.is_contradicted and merge.violated <= share * merge.agree
-
-
-def _passes(merge: Merge, config: GraphConfig, max_violated_share: float) -> bool:
+def _passes(merge: Merge, config: GraphConfig) -> bool:
     """Whether a merge may be made: supported well enough, contradicted by no pair across."""
-    if merge.margin < config.min_margin or not is_uncontradicted(merge, config, max_violated_share):
+    if merge.margin < config.min_margin or merge.is_contradicted:
         return False
     if any(proposal.is_good for proposal in merge.proposals):
         return merge.score > 0

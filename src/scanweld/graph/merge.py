@@ -168,9 +168,19 @@ def _demoted(proposal: Proposal, excluded: Collection[tuple[int, int, int]]) -> 
     return replace(proposal, is_good=False) if proposal.alternative in excluded else proposal
 
 
-def off_edges(merge: Merge, a: Poses, b: Poses, judge: PairJudge) -> Merge:
-    """The merge judged anew, edges forgiven, at poses of its scans that are all in one frame."""
-    evidence = [judge.off_edges(i, j, a[i].inverse() @ b[j]) for i in sorted(a) for j in sorted(b)]
+def judged_in_place(merge: Merge, a: Poses, b: Poses, poses: Poses, judge: PairJudge) -> Merge:
+    """The merge judged anew at poses of all its scans in one frame; its margin stays.
+
+    Args:
+        merge: A way to lay b onto a.
+        a: First component.
+        b: Second component.
+        poses: Of the scans of both.
+        judge: Gives the evidence on any pair at any pose.
+    """
+    evidence = [
+        judge.pair(i, j, poses[i].inverse() @ poses[j]) for i in sorted(a) for j in sorted(b)
+    ]
     return replace(_summed(merge.a_from_b, merge.proposals, evidence, judge), margin=merge.margin)
 
 
@@ -203,5 +213,5 @@ def _summed(
         agree=sum(e.agree for e in evidence),
         violated=sum(violated),
         free=sum(e.free for e in evidence),
-        worst=max(e.excess(judge.max_contradiction) for e in evidence),
+        worst=max(e.excess(judge.limits) for e in evidence),
     )

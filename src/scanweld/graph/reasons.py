@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from scanweld.config import GraphConfig
 from scanweld.evidence.evidence import MAX_EXCESS
 from scanweld.evidence.judge import PairJudge
 from scanweld.evidence.slippage import Slide, slide_words
@@ -96,9 +95,7 @@ def _rest_on_feature_alone(graph: ViewGraph, component: Component) -> set[int]:
     return set(component.poses) - (most if len(most) > 1 else set())
 
 
-def find_doubts(
-    graph: ViewGraph, judge: PairJudge, config: GraphConfig
-) -> dict[int, tuple[Doubt, ...]]:
+def find_doubts(graph: ViewGraph, judge: PairJudge) -> dict[int, tuple[Doubt, ...]]:
     """What speaks against the final poses of placed scans, by scan; known doubts stay."""
     marked: dict[int, str] = {}
     moved: dict[int, str] = {}
@@ -108,18 +105,18 @@ def find_doubts(
     for component in graph.components:
         for k in _rest_on_feature_alone(graph, component):
             marked[k] = "only a small mark decides its pose: others hide the mark"
-        for k, share in _unexplained(graph, component, judge).items():
+        in_front, in_free_space = _unexplained(graph, component, judge)
+        for k, share in in_front.items():
             moved[k] = (
+                f"a part of {share:.0%} of its surface lies before what another sensor saw: a part "
+                "of the object moved, or a pose is wrong"
+            )
+        for k, share in in_free_space.items():
+            violated[k] = (
                 f"a part of {share:.0%} of its surface lies where another sensor saw through: a "
                 "part of the object moved, or a pose is wrong"
             )
-        shares = _violated_shares(graph, component, judge)
-        for k, share in shares.items():
-            if share > config.max_violated_share:
-                violated[k] = (
-                    f"other sensors saw through its surface, or it hides theirs: {share:.0%} of "
-                    "what agrees"
-                )
+        for k in component.poses:
             if not graph.neighbours(k):
                 unpaired[k] = "no single pair confirms its pose"
     for edge in _good_but_rejected(graph):
@@ -159,27 +156,24 @@ def _strength(scan: int, graph: ViewGraph) -> float:
     return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
 
 
-def _unexplained(graph: ViewGraph, component: Component, judge: PairJudge) -> dict[int, float]:
-    """Largest part of each scan, or of one beside it, that no noise puts before a surface."""
-    poses, found = component.poses, dict[int, float]()
-    for i, j in graph.compared(component):
-        evidence = judge.pair(i, j, poses[i].inverse() @ poses[j])
-        if evidence.excess(judge.max_contradiction) > MAX_EXCESS:
-            for k in (i, j):
-                found[k] = max(found.get(k, 0.0), evidence.front_patch)
-    return found
+def _unexplained(
+    graph: ViewGraph, component: Component, judge: PairJudge
+) -> tuple[dict[int, float], dict[int, float]]:
+    """Largest part of each scan, or of one beside it, that the set's sensor does not excuse.
 
-
-def _violated_shares(graph: ViewGraph, component: Component, judge: PairJudge) -> dict[int, float]:
-    """Samples that speak against each scan's pose, as a share of those that agree."""
+    Before the surface that another sensor saw, and in its free space.
+    """
     poses = component.poses
-    agree, violated = dict.fromkeys(sorted(poses), 0.0), dict.fromkeys(sorted(poses), 0.0)
+    in_front: dict[int, float] = {}
+    in_free_space: dict[int, float] = {}
     for i, j in graph.compared(component):
-        evidence = judge.pair(i, j, poses[i].inverse() @ poses[j])
+        told = judge.pair(i, j, poses[i].inverse() @ poses[j])
         for k in (i, j):
-            agree[k] += evidence.agree
-            violated[k] += evidence.surface_violation
-    return {k: violated[k] / max(agree[k], 1e-9) for k in agree}
+            if told.front_excess(judge.limits) > MAX_EXCESS:
+                in_front[k] = max(in_front.get(k, 0.0), told.front_patch)
+            if told.free_excess(judge.limits) > MAX_EXCESS:
+                in_free_space[k] = max(in_free_space.get(k, 0.0), told.free_patch)
+    return in_front, in_free_space
 
 
 def _good_but_rejected(graph: ViewGraph) -> list[Edge]:

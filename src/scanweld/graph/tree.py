@@ -9,7 +9,6 @@ from collections.abc import Collection, Sequence
 
 from scanweld.evidence.judge import Poses
 from scanweld.geometry.pose import Pose
-from scanweld.graph.choose import is_uncontradicted
 from scanweld.graph.merge import judged_motion
 from scanweld.graph.problem import GraphProblem
 from scanweld.graph.view_graph import Edge
@@ -42,7 +41,7 @@ def _grown(problem: GraphProblem, edges: Sequence[Edge]) -> list[Poses]:
             continue
         a_from_b = a[i] @ problem.pairs[i, j].alternatives[0].i_from_j @ b[j].inverse()
         merge = judged_motion(a, b, a_from_b, problem.judge)
-        if not is_uncontradicted(merge, problem.config) or problem.joins_apart(a, b, merge):
+        if merge.is_contradicted or problem.joins_apart(a, b, merge):
             continue
         joined = dict(sorted({**a, **{k: a_from_b @ pose for k, pose in b.items()}}.items()))
         last = max(settled_at[k] for k in joined)

@@ -272,10 +272,10 @@ def _bodies(graph: ViewGraph) -> list[str]:
     """That not all of what the scans show moves as one body, where that is in doubt."""
     doubts = [doubt for some in graph.doubts.values() for doubt in some]
     told = sorted({doubt.text for doubt in doubts if doubt.code is DoubtCode.CAMERA_STOOD})
-    if any(doubt.code is DoubtCode.MOVED_PART for doubt in doubts):
+    if any(doubt.code in (DoubtCode.MOVED_PART, DoubtCode.VIOLATED) for doubt in doubts):
         told.append(
-            "parts of scans lie where other sensors saw through: a part of the object moved by "
-            "itself, or a pose is wrong"
+            "parts of scans lie where other sensors saw through or saw something else: a part of "
+            "the object moved by itself, or a pose is wrong"
         )
     return told
 

@@ -1,15 +1,15 @@
 """What sets a method apart: how it registers pairs, settles components and refines poses."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from scanweld.config import Section
 from scanweld.contours.coherence import ContourMatcher
 from scanweld.evidence.field import ScanField
-from scanweld.evidence.judge import Judge
-from scanweld.graph.problem import Settle
-from scanweld.graph.refine_graph import Refine
+from scanweld.evidence.judge import Judge, Poses
+from scanweld.graph.refine_graph import Refined
+from scanweld.graph.view_graph import Edge
 from scanweld.heat.features import Features
 from scanweld.pairs.registrar import PairScan, PairTask
 from scanweld.pairs.result import PairResult
@@ -45,6 +45,12 @@ class Scene:
         if self.sensor is None:
             raise ValueError("the pairs of the run say what its sensor does: register them first")
         return self.sensor
+
+
+Settle = Callable[[Poses, SensorModel | None], Poses]
+"""Refines the poses of a component as it grows, by what is known of the sensor."""
+Refine = Callable[[Poses, Sequence[Edge], Sequence[Edge], SensorModel], Refined]
+"""Refines the poses of a component, given its accepted and its compared pairs, and the sensor."""
 
 
 class Shortcuts(Protocol):

@@ -41,7 +41,7 @@ def graph_problem(
         centres=judge.centres,
         same=same_pose(scene, config),
         judge=judge,
-        settle=method.settle,
+        settle=lambda poses: method.settle(poses, scene.sensor),
         config=config.graph,
         apart=known.apart,
         initial=components,

@@ -6,7 +6,7 @@ views are adjacent, and does not ask whether its answer is right. Here the evide
 says both, as it does for the robust method.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scanweld.config import Config
@@ -23,6 +23,7 @@ from scanweld.pipeline.method import Method, Scene
 from scanweld.published.coarse import register_as_published
 from scanweld.published.judged_pose import judge_pose
 from scanweld.published.mm_icc import mm_icc
+from scanweld.sensor.model import SensorModel
 
 
 def published_method(scene: Scene, config: Config, workers: int) -> Method:
@@ -30,14 +31,15 @@ def published_method(scene: Scene, config: Config, workers: int) -> Method:
     del workers
     registrar = _PublishedRegistrar(config=config)
 
-    def stay(poses: Poses) -> Poses:
+    def stay(poses: Poses, sensor: SensorModel | None) -> Poses:
         """Unlike in the robust method nothing is refined while components grow."""
+        del sensor
         return poses
 
     def refine(
-        poses: Mapping[int, Pose], accepted: Sequence[Edge], compared: Sequence[Edge]
+        poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge], sensor: SensorModel
     ) -> Refined:
-        del compared
+        del compared, sensor
         aligned = mm_icc(scene.intake.prepared, poses, accepted, config.contours)
         return {**poses, **aligned.poses}, {}
 

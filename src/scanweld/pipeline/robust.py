@@ -1,17 +1,17 @@
 """The robust method: from any start, every pair judged."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from scanweld.config import Config
+from scanweld.config import Config, RefineConfig
 from scanweld.contours.coherence import contour_matcher
 from scanweld.evidence.judge import Poses
-from scanweld.geometry.pose import Pose
 from scanweld.graph.partners import partners
 from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
 from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pipeline.method import Method, Scene
 from scanweld.refinement.refine import refine_poses, scan_rms
+from scanweld.sensor.model import SensorModel
 
 NUM_SETTLING_ROUNDS = 3
 """Rounds of refinement of a component that grows, so that chains of pairs do not drift."""
@@ -24,15 +24,18 @@ def robust_method(scene: Scene, config: Config, workers: int) -> Method:
     registrar = PairRegistrar(config=config)
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
-    def settle(poses: Poses) -> Poses:
+    def settle(poses: Poses, sensor: SensorModel | None) -> Poses:
         compared = partners(poses, scene.judge, workers)
-        return refine_poses(scans, poses, compared, settling, workers=workers).poses
+        return refine_poses(
+            scans, poses, compared, _reaching(settling, sensor), workers=workers
+        ).poses
 
     def refine(
-        poses: Mapping[int, Pose], accepted: Sequence[Edge], compared: Sequence[Edge]
+        poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge], sensor: SensorModel
     ) -> Refined:
         del accepted
-        refined = refine_poses(scans, poses, compared, config.refine, contours, workers)
+        settings = _reaching(config.refine, sensor)
+        refined = refine_poses(scans, poses, compared, settings, contours, workers)
         return refined.poses, scan_rms(refined)
 
     return Method(
@@ -45,3 +48,12 @@ def robust_method(scene: Scene, config: Config, workers: int) -> Method:
         needs_features=config.pairs.keypoints != "even",
         shortcuts=registrar,
     )
+
+
+def _reaching(config: RefineConfig, sensor: SensorModel | None) -> RefineConfig:
+    """Settings by which surfaces are matched as far apart as the sensor leaves them."""
+    if sensor is None:
+        return config
+    first, last = config.match_diameters
+    reach = sensor.reach / sensor.diameter
+    return config.model_copy(update={"match_diameters": (max(first, reach), max(last, reach))})

@@ -53,9 +53,7 @@ def learnt(registered: Registered, config: Config, stages: Stages) -> Registered
         )
         sensor = replace(sensor, margin=scene.margin)
         counts["certain"] = sensor.num_certain
-        judge = replace(
-            judge, tolerance=sensor.tolerance, max_contradiction=sensor.max_contradiction
-        )
+        judge = replace(judge, tolerance=sensor.tolerance, limits=sensor.limits)
         pairs = _held(registered.pairs, scene, sensor)
     return replace(registered, scene=replace(scene, judge=judge, sensor=sensor), pairs=pairs)
 

@@ -3,12 +3,14 @@
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from scanweld.confidence.assess import Confidence, assess
 from scanweld.confidence.diagnostics import diagnostics_of
 from scanweld.confidence.model import stored_calibration
 from scanweld.config import Config
 from scanweld.errors import InputError
+from scanweld.evidence.evidence import PatchLimits
 from scanweld.evidence.field import make_field
 from scanweld.evidence.judge import Judge
 from scanweld.fusion.fuse import fuse
@@ -47,7 +49,7 @@ def lay_out(intake: Intake, config: Config, stages: Stages) -> Judge:
         fields=fields,
         diameter=intake.diameter,
         tolerance=tolerance,
-        max_contradiction=config.pairs.max_contradiction,
+        limits=PatchLimits(contradiction=config.pairs.max_contradiction),
     )
 
 
@@ -96,8 +98,9 @@ def refine_placed(
     """
     prepared = scene.intake.prepared
     with stages.stage("refine") as counts:
-        graph = refine_graph(graph, method.refine, scene.judge)
-        doubts = find_doubts(graph, scene.judge, config.graph)
+        refine = partial(method.refine, sensor=scene.known_sensor)
+        graph = refine_graph(graph, refine, scene.judge)
+        doubts = find_doubts(graph, scene.judge)
         doubts = merged(_standing_doubts(scene, graph), doubts)
         if axis is not None:
             doubts = merged(doubts, off_axis_doubts(graph, axis))

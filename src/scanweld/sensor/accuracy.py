@@ -21,9 +21,6 @@ from scanweld.refinement.surface_terms import SurfaceSource
 from scanweld.sensor.learn import PATCH_DIAMETERS
 from scanweld.sensor.model import SensorModel
 
-MATCH_SIGMAS = 3.0
-"""Farthest match, in standard deviations of the distance between surfaces."""
-
 
 def pose_deviations(
     sources: Mapping[int, SurfaceSource],
@@ -45,7 +42,7 @@ def pose_deviations(
     """
     diameter = sensor.diameter
     order = sorted(world_from_sensor)
-    radius = max(MATCH_SIGMAS * sensor.sigma, 0.006 * diameter)
+    radius = max(sensor.reach, 0.006 * diameter)
     found = match_surfaces(sources, world_from_sensor, pairs, radius, workers)
     middles = {k: world_from_sensor[k].apply(_middle(sources[k])) for k in order}
     covariance = _covariance(found, order, world_from_sensor, middles, sensor)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from scanweld.evidence.evidence import NO_LIMIT
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.information import two_way_matches
 from scanweld.geometry.arrays import FloatArray
@@ -14,6 +15,7 @@ from scanweld.geometry.buckets import cells_of
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.certain import Edge, certain_pairs
+from scanweld.sensor.closure import closure_displacement
 from scanweld.sensor.model import NUM_SPREAD_BINS, SPREAD_SIGMAS, SensorModel
 
 MIN_CERTAIN = 2
@@ -64,10 +66,14 @@ def learn_sensor(
         )
     sigma = 1.4826 * float(np.median(np.abs(residuals)))
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
-    limit = usual_contradiction
+    closure = closure_displacement(pairs, fields, diameter)
+    across = closure / np.sqrt(3.0)  # of a displacement that prefers no direction
+    sigma, correlated = float(np.hypot(sigma, across)), float(np.hypot(correlated, across))
+    limit, most_free = usual_contradiction, NO_LIMIT
     if len(certain) >= MIN_CERTAIN:
-        shown = [pair.alternatives[0].evidence.contradiction for pair in certain]
-        limit += float(np.quantile(shown, USUAL_SPREAD))
+        shown = [pair.alternatives[0].evidence for pair in certain]
+        limit += float(np.quantile([told.contradiction for told in shown], USUAL_SPREAD))
+        most_free = max(told.free_patch for told in shown)
     return SensorModel(
         num_certain=len(certain),
         sigma=sigma,
@@ -78,6 +84,8 @@ def learn_sensor(
         ),
         max_contradiction=min(limit, MAX_CONTRADICTION),
         diameter=diameter,
+        max_free_patch=most_free,
+        closure=closure,
         spread=_spread(residuals, sigma),
     )
 

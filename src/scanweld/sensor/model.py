@@ -2,10 +2,18 @@
 
 from dataclasses import dataclass
 
+from scanweld.evidence.evidence import NO_LIMIT, PatchLimits
+
 MARGIN = (
     "empty pixels nearer than {:.1%} to the border of what a scan shows say nothing: right poses "
     "put surface there, as of scans that were trimmed or lost their edges"
 )
+CLOSURE = (
+    "around cycles poses of pairs miss each other by {:.1%} each, as where depth is bent over "
+    "whole scans"
+)
+MATCH_SIGMAS = 3.0
+"""Farthest match, in standard deviations of the distance between surfaces."""
 SPREAD_SIGMAS, NUM_SPREAD_BINS = 5.0, 41
 """How far the spread of the distances is told, in standard deviations, and in how many bins."""
 
@@ -18,12 +26,17 @@ class SensorModel:
 
     Attributes:
         num_certain: Pairs that surfaces alone made certain, from which all this was learnt.
-        sigma: Robust standard deviation of the distances between surfaces that should coincide.
+        sigma: Robust standard deviation of the distances between surfaces that should coincide,
+            each scan having one pose.
         white: The part of it that neighbouring points do not share: the sensor's noise.
         correlated: The part that they share: bent depth, a scale that is a little off.
+        closure: How far one pair's pose moves a scan amiss, seen where cycles of pairs close; the
+            correlated part and the whole contain what surfaces lie apart by it.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
         diameter: Of the run.
+        max_free_patch: Largest patch in free space of a right pose, as a share of a scan's samples;
+            1 where that is not known.
         margin: Distance from silhouettes within which empty pixels say nothing; 0 where silhouettes
             are as exact as the surfaces.
         spread: Distances between surfaces that should coincide, counted in equal bins from
@@ -37,8 +50,25 @@ class SensorModel:
     tolerance: float
     max_contradiction: float
     diameter: float
+    max_free_patch: float = NO_LIMIT
+    closure: float = 0.0
     margin: float = 0.0
     spread: tuple[int, ...] = ()
+
+    @property
+    def reach(self) -> float:
+        """How far apart surfaces that should coincide may lie, in the scans' unit."""
+        return MATCH_SIGMAS * self.sigma
+
+    @property
+    def limits(self) -> PatchLimits:
+        """What the set excuses."""
+        return PatchLimits(contradiction=self.max_contradiction, free=self.max_free_patch)
+
+    @property
+    def _misses(self) -> bool:
+        """Whether cycles stay more open than noise leaves them."""
+        return self.closure > self.white
 
     def words(self) -> str:
         """The same in a sentence."""
@@ -50,5 +80,6 @@ class SensorModel:
             f"from {pairs}: surfaces lie {self.sigma / diameter:.2%} of the diameter apart "
             f"({self.white / diameter:.2%} noise, {self.correlated / diameter:.2%} shared by "
             f"neighbours); depth is compared to within {self.tolerance / diameter:.1%}"
+            + (f"; {CLOSURE.format(self.closure / diameter)}" if self._misses else "")
             + (f"; {MARGIN.format(self.margin / diameter)}" if self.margin else "")
         )

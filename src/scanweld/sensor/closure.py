@@ -1,0 +1,73 @@
+"""How far poses of pairs miss each other around cycles: what a sensor's bent depth does to them.
+
+Depth that is bent over a whole scan hides from a pair: its pose gives way until the surfaces lie on
+each other. But it gives way differently in every pair, so that cycles of pairs do not close. What
+is left open is by how much surfaces lie apart once all scans have one pose each.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.sparse.csgraph import shortest_path
+
+from scanweld.evidence.field import ScanField
+from scanweld.evidence.rivals import RIVAL_SHIFT_DIAMETERS
+from scanweld.geometry.arrays import BoolArray
+from scanweld.geometry.pose import Pose
+from scanweld.pairs.result import PairKind, PairResult
+from scanweld.sensor.certain import Edge
+
+MIN_CYCLES = 2
+"""One cycle may close, or not, by chance."""
+
+
+def closure_displacement(
+    pairs: Mapping[Edge, PairResult], fields: Sequence[ScanField], diameter: float
+) -> float:
+    """Root mean square distance by which one pair moves a scan's samples amiss, in scans' units.
+
+    Good pairs make a tree, the strongest first; every other good pair closes a cycle of it, and
+    errors of the pairs around a cycle add up like independent ones. The median over the cycles
+    that close: where a pair moves samples as far as rival poses are apart, some pair is wrong.
+    0 of fewer than two cycles.
+
+    Args:
+        pairs: All pairs, judged.
+        fields: All scans, laid out.
+        diameter: Of the run, in the scans' unit.
+    """
+    good = sorted(
+        (pair for pair in pairs.values() if pair.kind is PairKind.GOOD),
+        key=lambda pair: (-pair.alternatives[0].score, pair.i, pair.j),
+    )
+    home, in_tree = _strongest_tree(good, len(fields))
+    steps = shortest_path(in_tree, directed=False, unweighted=True)
+    most = RIVAL_SHIFT_DIAMETERS * diameter
+    found = []
+    for pair in good:
+        if in_tree[pair.i, pair.j]:
+            continue
+        poses, samples = home[pair.i], fields[pair.j].points
+        amiss = poses[pair.j].inverse() @ poses[pair.i] @ pair.alternatives[0].i_from_j
+        moved = np.linalg.norm(amiss.apply(samples) - samples, axis=1)
+        length = np.sqrt(1.0 + steps[pair.i, pair.j])
+        if (each := float(np.sqrt(np.mean(moved**2))) / length) < most:
+            found.append(each)
+    return float(np.median(found)) if len(found) >= MIN_CYCLES else 0.0
+
+
+def _strongest_tree(
+    pairs: Sequence[PairResult], num_scans: int
+) -> tuple[dict[int, dict[int, Pose]], BoolArray]:
+    """The poses of each scan's tree, by scan, and which pairs (N, N), i < j, make the trees."""
+    home = {k: {k: Pose.identity()} for k in range(num_scans)}
+    in_tree = np.zeros((num_scans, num_scans), dtype=bool)
+    for pair in pairs:
+        a, b = home[pair.i], home[pair.j]
+        if a is b:
+            continue
+        in_tree[pair.i, pair.j] = True
+        a_from_b = a[pair.i] @ pair.alternatives[0].i_from_j @ b[pair.j].inverse()
+        a.update({k: a_from_b @ pose for k, pose in b.items()})
+        home.update(dict.fromkeys(b, a))
+    return home, in_tree
