@@ -90,7 +90,6 @@ def scan_grounds(
     said, fit = joint.said_of(k), joint.fits[k]
     agree, patches = sum(e.agree for e in said), sum(e.patches for e in said)
     return {
-        "agree": float(np.log10(max(agree, LEAST_SHARE))),
         "consent": -violated(said),
         "contradiction": -min(patches / max(agree, MIN_AGREE), MAX_CONTRADICTION),
         "margin": joint.margins[k],
