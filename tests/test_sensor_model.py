@@ -164,6 +164,7 @@ def test_patches_in_free_space_are_held_to_what_certain_pairs_show(
     )
     assert through.excess(honest.limits) > MAX_EXCESS
     assert through.excess(trimmed.limits) <= MAX_EXCESS and trimmed.max_free_patch == 0.1
+    assert through.free_excess(trimmed.limits) > MAX_EXCESS, "placed, and doubted"
     assert through.excess(unknown.limits) <= 0.0, "without certain pairs nothing is known"
 
 

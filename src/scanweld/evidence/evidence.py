@@ -96,11 +96,11 @@ class Evidence:
         Scans that hardly meet have little that agrees, and yet such patches where silhouettes are
         cut: these are held to what is seen there at poses that surfaces make sure.
         """
-        return FREE_PATCH_WEIGHT * (self.free_patch - limits.free)
+        return self.free_patch - limits.free
 
     def excess(self, limits: PatchLimits) -> float:
-        """The larger of both."""
-        return max(self.front_excess(limits), self.free_excess(limits))
+        """The larger of both, weighted: what refuses a merge, while less makes its scans doubtful."""
+        return max(self.front_excess(limits), FREE_PATCH_WEIGHT * self.free_excess(limits))
 
     @property
     def surface_violation(self) -> float:
