@@ -11,7 +11,7 @@ from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
 from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pipeline.method import Method, Scene
-from scanweld.refinement.refine import refine_poses, scan_rms
+from scanweld.refinement.refine import refine_poses, refined_poses, scan_rms
 
 NUM_SETTLING_ROUNDS = 3
 """Rounds of refinement of a component that grows, so that chains of pairs do not drift."""
@@ -26,7 +26,7 @@ def robust_method(scene: Scene, config: Config, workers: int) -> Method:
 
     def settle(poses: Poses) -> Poses:
         compared = partners(poses, scene.judge, workers)
-        return refine_poses(scans, poses, compared, settling, workers=workers).poses
+        return refined_poses(scans, poses, compared, settling, workers=workers)
 
     def refine(
         poses: Mapping[int, Pose], accepted: Sequence[Edge], compared: Sequence[Edge]
