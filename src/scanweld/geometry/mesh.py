@@ -103,7 +103,9 @@ def opposite_edges(faces: IntArray, num_vertices: int) -> IntArray:
 
 def next_corner(corners: IntArray) -> IntArray:
     """The next corners around their faces; corner 3 f + k is the k-th of face f."""
-    return corners - corners % 3 + (corners + 1) % 3
+    after = corners + 1
+    after[corners % 3 == 2] -= 3
+    return after
 
 
 def pieces(faces: IntArray, num_vertices: int) -> IntArray:
