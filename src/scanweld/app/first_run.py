@@ -26,7 +26,7 @@ KERNELS = {
     "preparation.resolution._nearest_on_line": "f8w2 f8w1 i8w1",
     "geometry.buckets.into_buckets": "f8w2 f8",
     "geometry.buckets.are_beside": "f8w2 i8w1 i8w1 f8 i8",
-    "geometry.grid._find_faces": "i8r2 f8w2 f8w1 f8 f8 i8w2",
+    "geometry.grid._find_faces": "i4r2 f8w2 f8w1 f8 f8 i8w2",
     "geometry.rasterize._fill": "f8w2 f8w1 i8w2 b1 f8w2 i8w2",
     "preparation.denoise._fit_planes": "f8w2 i8 f8 f8",
     "geometry.mesh.connected": "i8w1 i8w1 i8",
