@@ -168,6 +168,15 @@ def test_a_run_calls_kernels_with_what_they_are_compiled_for_ahead(tmp_path: Pat
     assert (tmp_path / "model" / "model.ply").exists(), "it got as far as the fusion"
 
 
+def test_all_kernels_that_are_compiled_ahead_are_there_with_as_many_arguments():
+    called = {**first_run.VIDEO_KERNELS, **first_run.KERNELS}
+    for name in called:
+        code = first_run.kernel(name).py_func.__code__
+        assert len(first_run.argument_types(name)) == code.co_argcount, name
+    missing = first_run.missing_kernels(of_video=True)
+    assert set(missing) - set(first_run.missing_kernels()) <= set(first_run.VIDEO_KERNELS)
+
+
 def test_another_process_compiles_what_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
