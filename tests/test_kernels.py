@@ -168,18 +168,27 @@ def test_a_run_calls_kernels_with_what_they_are_compiled_for_ahead(tmp_path: Pat
     assert (tmp_path / "model" / "model.ply").exists(), "it got as far as the fusion"
 
 
+def test_all_kernels_that_are_compiled_ahead_are_there_with_as_many_arguments():
+    called = {**first_run.VIDEO_KERNELS, **first_run.KERNELS}
+    for name in called:
+        code = first_run.kernel(name).py_func.__code__
+        assert len(first_run.argument_types(name)) == code.co_argcount, name
+    missing = first_run.missing_kernels(of_video=True)
+    assert set(missing) - set(first_run.missing_kernels()) <= set(first_run.VIDEO_KERNELS)
+
+
 def test_another_process_compiles_what_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     one = "geometry.mesh.connected"
     assert set(first_run.KERNELS) >= set(first_run.missing_kernels())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(first_run, "missing_kernels", lambda: [one])
+    monkeypatch.setattr(first_run, "missing_kernels", lambda **_: [one])
     with first_run.compiling_ahead(print, workers=2):
         until = time.monotonic() + 60
         while not list(tmp_path.rglob("mesh.connected-*.nbc")) and time.monotonic() < until:
             time.sleep(0.1)
     assert list(tmp_path.rglob("mesh.connected-*.nbi")) and "once" in capsys.readouterr().out
-    monkeypatch.setattr(first_run, "missing_kernels", list)
+    monkeypatch.setattr(first_run, "missing_kernels", lambda **_: [])
     with first_run.compiling_ahead(print):
         assert not capsys.readouterr().out, "nothing is said where nothing is missing"

@@ -252,6 +252,18 @@ def test_point_spacing_of_a_lattice(scale: float):
     lattice = scale * np.stack([columns.ravel(), 3 * rows.ravel(), 0 * rows.ravel()], axis=1)
     assert point_spacing(lattice) == pytest.approx(scale)
     assert point_spacing(np.repeat(lattice, 2, axis=0)) == pytest.approx(scale)
+    planes = np.concatenate([lattice, lattice + np.array([0.0, 0.0, 1e4 * scale])])
+    assert point_spacing(planes + 1e6 * scale) == pytest.approx(scale)
+
+
+@pytest.mark.parametrize("copies", [1, 3, 4])
+def test_point_spacing_is_what_a_tree_finds(copies: int):
+    points = np.repeat(np.random.default_rng(0).normal(size=(700, 3)), copies, axis=0)
+    distances = np.linalg.norm(points[::copies, None] - points[None, ::copies], axis=2)
+    np.fill_diagonal(distances, np.inf)
+    nearest = np.median(distances.min(axis=1))
+    assert point_spacing(points) == pytest.approx(0.0 if copies == 4 else nearest)
+    assert point_spacing(points[:1]) == 0.0
 
 
 def around(width: int, turn: float, *, step: float = 2 * np.pi / 1600, up: int = 1) -> RangeScan:

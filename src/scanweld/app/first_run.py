@@ -20,11 +20,13 @@ SECONDS_A_KERNEL = 0.6
 """CPU time to compile one, of about 2.4 GHz."""
 
 KERNELS = {
+    "io.text._simple_numbers": "u1r1",
     "io.ply_body._find_lists": "u1r1 i8 i8 i8w2 b1",
     "io.ply_body._octets_of_lists": "u1r1 i8w1 i8w1",
+    "preparation.resolution._nearest_on_line": "f8w2 f8w1 i8w1",
     "geometry.buckets.into_buckets": "f8w2 f8",
     "geometry.buckets.are_beside": "f8w2 i8w1 i8w1 f8 i8",
-    "geometry.grid._find_faces": "i8r2 f8w2 f8w1 f8 f8 i8w2",
+    "geometry.grid._find_faces": "i4r2 f8w2 f8w1 f8 f8 i8w2",
     "geometry.rasterize._fill": "f8w2 f8w1 i8w2 b1 f8w2 i8w2",
     "preparation.denoise._fit_planes": "f8w2 i8 f8 f8",
     "geometry.mesh.connected": "i8w1 i8w1 i8",
@@ -60,24 +62,36 @@ KERNELS = {
 }
 """What a usual run calls, in the order of its first calls, and with what (see ``types_of``)."""
 
+VIDEO_KERNELS = {
+    "video.levels._halved": "f8w2 f8 f8w1",
+    "video.levels._planes": "f8w2 f8w1 i8 f8 f8w1",
+    "video.match.settle": "f8w2 f8w3 f8w1 f8w1 f8w1 f8w1 f8w1 f8 i4w2 f8w2 f8w2",
+    "video.average._add": "f8w2 f8w3 f8w1 f8w1 f8w1 f8 f8w2 f8w2 i4w2 i4w2",
+}
+"""What the run of a video calls before all others."""
 
-def missing_kernels() -> list[str]:
+
+def missing_kernels(*, of_video: bool = False) -> list[str]:
     """Those of the kernels that have not been compiled yet, in the order of their first calls."""
     from scanweld.compiled.kernels import kept_names
 
     kept = kept_names()
-    return [name for name in KERNELS if ".".join(name.split(".")[-2:]) not in kept]
+    called = [*VIDEO_KERNELS, *KERNELS] if of_video else [*KERNELS]
+    return [name for name in called if ".".join(name.split(".")[-2:]) not in kept]
 
 
 @contextmanager
-def compiling_ahead(tell: Callable[[str], object], workers: int | None = None) -> Iterator[None]:
+def compiling_ahead(
+    tell: Callable[[str], object], workers: int | None = None, *, of_video: bool = False
+) -> Iterator[None]:
     """Let other processes compile what is missing for as long as the context lasts.
 
     Args:
         tell: Called with a line on it, if anything is missing.
         workers: Processes, this one among them; as many as there are cores if None.
+        of_video: Whether the run is of a video.
     """
-    missing = missing_kernels()
+    missing = missing_kernels(of_video=of_video)
     count = min(num_workers(workers), MAX_PROCESSES)
     if not missing or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         yield
@@ -114,7 +128,7 @@ def argument_types(name: str) -> tuple[Any, ...]:
     """The types of a kernel's arguments, by its name in the table."""
     from scanweld.compiled.kernels import types_of
 
-    return types_of(KERNELS[name])
+    return types_of({**VIDEO_KERNELS, **KERNELS}[name])
 
 
 def main(names: Sequence[str]) -> None:

@@ -164,7 +164,7 @@ def run(options: RunOptions) -> None:
     processes = options.workers if memory is None else 1  # others would take memory too
     try:
         with (
-            compiling_ahead(options.show.tell, processes),
+            compiling_ahead(options.show.tell, processes, of_video=options.video),
             options.show.reporting() as progress,
         ):
             size = None if memory is None else parse_size(memory)

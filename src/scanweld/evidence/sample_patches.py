@@ -64,7 +64,7 @@ def _largest_patches(
     """Sizes (P, 2) at each pose row (P, 12)."""
     sizes = np.zeros((len(poses), 2), dtype=np.int64)
     for p in range(len(poses)):
-        sizes[p] = _largest(camera, raster, points, normals, neighbours, poses[p], tolerance)
+        _largest(camera, raster, points, normals, neighbours, poses[p], tolerance, sizes[p])
     return sizes
 
 
@@ -77,8 +77,9 @@ def _largest(
     neighbours: NDArray[np.int32],
     pose: FloatArray,
     tolerance: float,
-) -> NDArray[np.int64]:
-    """Samples (2,) in the largest patch before the surface that a sensor saw, and past it.
+    largest: NDArray[np.int64],
+) -> None:
+    """Count samples in the largest patch (2,) before the surface that a sensor saw, and past it.
 
     The pose row leads from the samples' frame to the sensor's; neighbours are (N, K).
     """
@@ -94,7 +95,8 @@ def _largest(
     for s in range(count):
         if said[s] == 0:
             continue
-        for n in neighbours[s]:
+        for k in range(neighbours.shape[1]):
+            n = neighbours[s, k]
             if said[n] == said[s]:
                 a, b = s, n
                 while root[a] != a:
@@ -105,15 +107,14 @@ def _largest(
                     b = root[b]
                 root[max(a, b)] = min(a, b)
     sizes = np.zeros(count, dtype=np.int64)
-    largest = np.zeros(2, dtype=np.int64)
     for s in range(count):
         if said[s] != 0:
             a = s
             while root[a] != a:
                 a = root[a]
             sizes[a] += 1
-            largest[said[s] - 1] = max(largest[said[s] - 1], sizes[a])
-    return largest
+            kind = said[s] - 1
+            largest[kind] = max(largest[kind], sizes[a])
 
 
 @njit(cache=True, nogil=True)

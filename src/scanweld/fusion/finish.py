@@ -179,9 +179,11 @@ def split_fans(faces: IntArray) -> tuple[IntArray, IntArray]:
     faces = faces[~_is_back_to_back(faces, *corners_at(faces, size))]
     opposite = opposite_edges(faces, size)
     edge = np.flatnonzero(opposite >= 0)
-    other = opposite[edge]
     # Faces that share an edge run along it in opposite directions.
-    fan = connected(edge, next_corner(other), faces.size)
+    after = next_corner(opposite[edge])
+    del opposite  # of two million faces, each of these arrays takes 50 MB
+    fan = connected(edge, after, faces.size)
+    del edge, after
     vertex = np.zeros(fan.max(initial=-1) + 1, dtype=np.int64)
     vertex[fan] = faces.ravel()
     order = np.argsort(vertex, kind="stable")  # numbered in the order of the old vertices

@@ -23,7 +23,7 @@ from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
 from scanweld.fusion.sheets import NORMAL_ROUNDS, without_second_sheets
 from scanweld.fusion.surface import extract_surface, vertex_flags
-from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS, Volume
+from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS
 from scanweld.fusion.voxels import image_pixels, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
@@ -76,9 +76,7 @@ def fuse(
     voxel = voxel_edge(scans, config)
     depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
     truncation = max(config.truncation_voxels * voxel, 2.0 * depth)
-    volume = integrate(images, voxel, truncation, depth, workers)
-    logger.debug("%d blocks of voxels of %.4g", len(volume.blocks), voxel)
-    vertices, faces, filled = _surface(volume, images, depth, config, workers)
+    vertices, faces, filled = _surface(images, voxel, truncation, depth, config, workers)
     if not len(faces):
         raise InputError(
             "no surface is left of the posed scans, because they contradict each other everywhere: "
@@ -121,32 +119,45 @@ def _images(
 
 
 def _surface(
-    volume: Volume,
     images: Sequence[PosedImage],
+    voxel: float,
+    truncation: float,
     depth: float,
     config: FusionConfig,
     workers: int,
 ) -> tuple[FloatArray, IntArray, BoolArray]:
     """Vertices, faces, and which of the vertices were not measured."""
+    vertices, faces, filled = _extracted(images, voxel, truncation, depth, config, workers)
+    faces, parts = split_fans(faces)
+    vertices, faces, filled = chosen_pieces(
+        vertices[parts], faces, filled[parts], voxel, config.component
+    )
+    vertices, faces, filled = close_pinholes(vertices, faces, filled, _PINHOLE_VOXELS * voxel)
+    return smoothed(vertices, faces, _FILLED_ROUNDS, filled), faces, filled
+
+
+def _extracted(
+    images: Sequence[PosedImage],
+    voxel: float,
+    truncation: float,
+    depth: float,
+    config: FusionConfig,
+    workers: int,
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """The same as it comes out of the voxels, which take much memory and are let go here."""
+    volume = integrate(images, voxel, truncation, depth, workers)
+    logger.debug("%d blocks of voxels of %.4g", len(volume.blocks), voxel)
     closing = config.holes
     if closing == "open" and config.watertight:
         closing = "fill"
     if closing == "open":
         vertices, faces = extract_surface(volume)
-        vertices, faces = _seen_part(vertices, faces, images, volume.voxel, workers)
-        filled = np.zeros(len(vertices), dtype=bool)
-    else:
-        field = closed_field(volume, images, closing, depth, workers)
-        vertices, faces = extract_surface(field.volume, field.distance)
-        filled = ~vertex_flags(field.volume, field.is_measured, vertices)
-    faces, parts = split_fans(faces)
-    vertices, faces, filled = chosen_pieces(
-        vertices[parts], faces, filled[parts], volume.voxel, config.component
-    )
-    vertices, faces, filled = close_pinholes(
-        vertices, faces, filled, _PINHOLE_VOXELS * volume.voxel
-    )
-    return smoothed(vertices, faces, _FILLED_ROUNDS, filled), faces, filled
+        del volume
+        vertices, faces = _seen_part(vertices, faces, images, voxel, workers)
+        return vertices, faces, np.zeros(len(vertices), dtype=bool)
+    field = closed_field(volume, images, closing, depth, workers)
+    vertices, faces = extract_surface(field.volume, field.distance)
+    return vertices, faces, ~vertex_flags(field.volume, field.is_measured, vertices)
 
 
 def _seen_part(

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+IndexArray = NDArray[np.signedinteger]
+"""Whole numbers of any size: those of a scan's grid take half as much memory."""
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scanweld.compiled.kernels import njit
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray, IndexArray, IntArray
 
 GAP_ROUNDS = 2
 """Gaps between measured cells (pixels or voxels) are lost returns, up to this many cells from the
@@ -11,7 +11,7 @@ nearest measured one: they are filled from their neighbours in so many rounds.""
 
 
 def grid_faces(
-    grid: IntArray, points: FloatArray, depth: FloatArray, max_step: float, max_edge: float
+    grid: IndexArray, points: FloatArray, depth: FloatArray, max_step: float, max_edge: float
 ) -> IntArray:
     """Triangles over the 2 x 2 blocks of a grid of point indices.
 
@@ -29,7 +29,7 @@ def grid_faces(
     Returns:
         (F, 3) indices of points.
     """
-    known = np.ascontiguousarray(grid).view()
+    known = np.ascontiguousarray(grid, dtype=np.int32).view()
     known.flags.writeable = False  # as frozen grids are: the kernel is then compiled once only
     arrays = known, np.ascontiguousarray(points), np.ascontiguousarray(depth)
     no_faces = np.empty((0, 3), np.int64)
@@ -40,7 +40,7 @@ def grid_faces(
 
 @njit(cache=True, nogil=True)
 def _find_faces(
-    grid: IntArray,
+    grid: IndexArray,
     points: FloatArray,
     depth: FloatArray,
     max_step: float,

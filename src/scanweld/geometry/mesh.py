@@ -103,7 +103,9 @@ def opposite_edges(faces: IntArray, num_vertices: int) -> IntArray:
 
 def next_corner(corners: IntArray) -> IntArray:
     """The next corners around their faces; corner 3 f + k is the k-th of face f."""
-    return corners - corners % 3 + (corners + 1) % 3
+    after = corners + 1
+    after[corners % 3 == 2] -= 3
+    return after
 
 
 def pieces(faces: IntArray, num_vertices: int) -> IntArray:
@@ -114,8 +116,10 @@ def pieces(faces: IntArray, num_vertices: int) -> IntArray:
 
 def compact(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
     """Drop unused vertices: (vertices, faces, kept indices of the old vertices)."""
-    kept, inverse = np.unique(faces, return_inverse=True)
-    return vertices[kept], inverse.reshape(faces.shape), kept
+    is_used = np.zeros(len(vertices), dtype=bool)
+    is_used[faces] = True
+    kept = np.flatnonzero(is_used)
+    return vertices[kept], (np.cumsum(is_used) - 1)[faces], kept
 
 
 @njit(cache=True, nogil=True)

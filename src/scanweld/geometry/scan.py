@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray, frozen
+from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IndexArray, IntArray, frozen
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
 
@@ -28,6 +28,7 @@ class RangeScan:
         name: Unique in a run; the file's stem.
         points: (N, 3), finite, scan frame, unit of the file.
         grid: (H, W) index of each cell's point, -1 where nothing was seen; or None.
+            Of 32 bits, whatever is given.
         faces: (M, 3) indices of points, where the file was a mesh; or None.
         normals: (N, 3) or None, as the file gave them.
         colors: (N, 3) uint8 or None.
@@ -47,7 +48,7 @@ class RangeScan:
 
     name: str
     points: FloatArray
-    grid: IntArray | None = None
+    grid: IndexArray | None = None
     faces: IntArray | None = None
     normals: FloatArray | None = None
     colors: ByteArray | None = None
@@ -66,9 +67,9 @@ class RangeScan:
         if not np.isfinite(self.points).all():
             raise ValueError("a scan's points must be finite")
         if self.grid is not None:
-            put("grid", frozen(self.grid, np.int64, (None, None)))
-            if self.grid.size and (self.grid.max() >= n or self.grid.min() < -1):
+            if np.size(self.grid) and (np.max(self.grid) >= n or np.min(self.grid) < -1):
                 raise ValueError("the grid names points that do not exist")
+            put("grid", frozen(self.grid, np.int32, (None, None)))
         if self.faces is not None:
             put("faces", frozen(self.faces, np.int64, (None, 3)))
             if self.faces.size and (self.faces.max() >= n or self.faces.min() < 0):
@@ -126,7 +127,8 @@ class RangeScan:
     def content_hash(self) -> str:
         """A hash of everything measured, without the name: the same content gives the same hash."""
         digest = hashlib.sha256()
-        parts = (self.points, self.grid, self.faces, self.normals, self.colors, self.confidence)
+        grid = None if self.grid is None else self.grid.astype(np.int64)
+        parts = (self.points, grid, self.faces, self.normals, self.colors, self.confidence)
         for part in parts:
             digest.update(b"-" if part is None else repr(part.shape).encode() + part.tobytes())
         digest.update(repr(self.camera).encode())

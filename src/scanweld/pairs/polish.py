@@ -11,7 +11,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.pairs.problem import PairProblem
 from scanweld.pairs.result import Alternative
-from scanweld.refinement.refine import refine_poses
+from scanweld.refinement.refine import refined_poses
 
 NUM_POLISHED = 2
 """Alternatives that are refined with all points and contours, at most."""
@@ -58,8 +58,8 @@ class JointPolish:
         i, j = self.edge
         for _ in range(MAX_POLISHES):
             start = {i: Pose.identity(), j: i_from_j}
-            refined = refine_poses(self.scans, start, [self.edge], self.config, self.contours)
-            i_from_j = refined.poses[j]
+            refined = refined_poses(self.scans, start, [self.edge], self.config, self.contours)
+            i_from_j = refined[j]
             moved = start[j].inverse() @ i_from_j
             shift = moved.shift_at(self.centre_j) / self.diameter
             if moved.angle_deg() < CONVERGED_DEG and shift < CONVERGED_DIAMETERS:

@@ -6,7 +6,7 @@ import numpy as np
 
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
-from scanweld.geometry.arrays import IntArray
+from scanweld.geometry.arrays import IndexArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose
@@ -36,7 +36,7 @@ class Preparation:
     camera: Camera | None
     scan_from_sensor: Pose
     viewpoint: Viewpoint
-    grid: IntArray | None
+    grid: IndexArray | None
     notes: tuple[str, ...]
     image: RangeImage
     mesh: TriangleMesh
@@ -97,5 +97,5 @@ def try_prepare(
     )
 
 
-def _are_same(a: IntArray | None, b: IntArray | None) -> bool:
+def _are_same(a: IndexArray | None, b: IndexArray | None) -> bool:
     return a is b or (a is not None and b is not None and np.array_equal(a, b))

@@ -10,7 +10,7 @@ from scanweld.graph.refine_graph import Refined
 from scanweld.graph.view_graph import Edge
 from scanweld.pairs.registrar import PairRegistrar
 from scanweld.pipeline.method import Method, Scene
-from scanweld.refinement.refine import refine_poses, scan_rms
+from scanweld.refinement.refine import refine_poses, refined_poses, scan_rms
 from scanweld.sensor.model import SensorModel
 
 NUM_SETTLING_ROUNDS = 3
@@ -26,9 +26,8 @@ def robust_method(scene: Scene, config: Config, workers: int) -> Method:
 
     def settle(poses: Poses, sensor: SensorModel | None) -> Poses:
         compared = partners(poses, scene.judge, workers)
-        return refine_poses(
-            scans, poses, compared, _reaching(settling, sensor), workers=workers
-        ).poses
+        settings = _reaching(settling, sensor)
+        return refined_poses(scans, poses, compared, settings, workers=workers)
 
     def refine(
         poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge], sensor: SensorModel

@@ -153,9 +153,9 @@ def _linear_pinhole(unit: FloatArray, pixels: FloatArray) -> FloatArray | None:
 
 def _decompose(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Intrinsics fx, fy, cx, cy, rotation and shift of a (3, 4) with positive determinant."""
-    from scipy.linalg import rq
-
-    upper, rotation = (np.asarray(part, dtype=np.float64) for part in rq(matrix[:, :3]))
+    # The QR decomposition, with rows and columns reversed: SciPy's RQ takes long to import.
+    turned, lower = np.linalg.qr(matrix[::-1, :3].T)
+    upper, rotation = lower.T[::-1, ::-1], turned.T[::-1]
     signs = np.sign(np.diag(upper))
     upper, rotation = upper * signs, signs[:, None] * rotation
     shift: FloatArray = np.linalg.solve(upper, matrix[:, 3]).astype(np.float64)

@@ -1,10 +1,10 @@
 """Scan -> prepared scan: sensor located, rendered into a range image, sampled evenly."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.prepared import PreparedScan, RangeImage, Samples
@@ -16,12 +16,15 @@ from scanweld.preparation.sensor import MIN_POINTS, locate_sensor
 from scanweld.preparation.strays import without_strays
 from scanweld.preparation.support import find_support
 
+if TYPE_CHECKING:
+    from scanweld.config import PrepareConfig
+
 MIN_SURFACE_PIXELS = 200
 """Pixels of surface that a scan must have to be registered."""
 
 
 def prepare(
-    scan: RangeScan, config: PrepareConfig, *, without_support: bool = False
+    scan: RangeScan, config: "PrepareConfig", *, without_support: bool = False
 ) -> PreparedScan:
     """Make a scan ready for registration.
 

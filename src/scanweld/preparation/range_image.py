@@ -1,8 +1,9 @@
 """A scan as a range image at the working resolution, whatever its file looked like."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from scanweld.config import PrepareConfig
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.grid import GAP_ROUNDS, grid_faces
@@ -19,6 +20,9 @@ from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.denoise import CLEAN_NOISE_PIXELS, clean_depth, has_gaps
 from scanweld.preparation.silhouette import classify_pixels
 
+if TYPE_CHECKING:
+    from scanweld.config import PrepareConfig
+
 MARGIN_DIAMETERS = 0.05
 """Width of the free space around the closed silhouette that is part of the image."""
 MAX_EDGE_PIXELS = 4.0
@@ -34,7 +38,7 @@ NORMAL_SMOOTHING_ROUNDS = 2
 
 
 def make_range_image(
-    scan: RangeScan, points: FloatArray, resolution: float, diameter: float, config: PrepareConfig
+    scan: RangeScan, points: FloatArray, resolution: float, diameter: float, config: "PrepareConfig"
 ) -> tuple[RangeImage, TriangleMesh]:
     """Render a scan into a regular range image along its own viewing rays.
 
@@ -86,7 +90,7 @@ def render_surface(
     spacing: float,
     pixel: float,
     margin: float,
-    config: PrepareConfig,
+    config: "PrepareConfig",
     max_noise_pixels: float = CLEAN_NOISE_PIXELS,
 ) -> tuple[Camera, FloatArray, TriangleMesh]:
     """A scan's surface along its own viewing rays, at any footprint of a pixel.
@@ -125,7 +129,7 @@ def render_surface(
     return camera, depth, mesh
 
 
-def _pixel_size(spacing: float, diameter: float, config: PrepareConfig) -> float:
+def _pixel_size(spacing: float, diameter: float, config: "PrepareConfig") -> float:
     """Footprint of a pixel: the points' spacing, or a whole part of it where that is coarse."""
     if spacing * min(COARSE_PIXELS, config.image_pixels) <= diameter:
         return spacing
@@ -161,7 +165,7 @@ def working_camera(scan: RangeScan, points: FloatArray, pixel: float, margin: fl
 
 
 def _scan_faces(
-    scan: RangeScan, points: FloatArray, spacing: float, config: PrepareConfig
+    scan: RangeScan, points: FloatArray, spacing: float, config: "PrepareConfig"
 ) -> IntArray | None:
     """Triangles (F, 3) between the scan's points; None for bare points."""
     if scan.grid is None:
@@ -229,7 +233,7 @@ def _fill_pinholes(depth: FloatArray, max_step: float) -> FloatArray:
 
 
 def _surface(
-    depth: FloatArray, camera: Camera, pixel: float, config: PrepareConfig
+    depth: FloatArray, camera: Camera, pixel: float, config: "PrepareConfig"
 ) -> tuple[FloatArray, TriangleMesh]:
     """The mesh of a depth image, and the image without pieces too small to be a surface."""
     points, faces = _depth_faces(depth, camera, pixel, config)
@@ -244,7 +248,7 @@ def _surface(
 
 
 def _depth_faces(
-    depth: FloatArray, camera: Camera, pixel: float, config: PrepareConfig
+    depth: FloatArray, camera: Camera, pixel: float, config: "PrepareConfig"
 ) -> tuple[FloatArray, IntArray]:
     """Points (V, 3) of the surface's pixels in row-major order, and triangles (F, 3) of them."""
     has = np.isfinite(depth)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from scanweld.errors import InputError
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray, IndexArray
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.scan import RangeScan, Viewpoint, principal_diameter
@@ -113,7 +113,7 @@ def _in_own_frame(scan: RangeScan) -> RangeScan | None:
     return scan.with_sensor(Pose.identity(), Viewpoint.ESTIMATED, note)
 
 
-def _cells(points: FloatArray, grid: IntArray) -> tuple[FloatArray, FloatArray]:
+def _cells(points: FloatArray, grid: IndexArray) -> tuple[FloatArray, FloatArray]:
     """The grid's points (M, 3) and their cells (M, 2) (column, row), evenly thinned."""
     rows, columns = np.nonzero(grid >= 0)
     stride = max(1, len(rows) // MAX_FIT_CELLS)

@@ -7,7 +7,7 @@ count azimuths, rows elevations. That is how PTX and E57 files hold such scans.
 import numpy as np
 
 from scanweld.errors import InputError
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray, IndexArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.scan import RangeScan
@@ -72,7 +72,7 @@ def fit_spherical(scan: RangeScan) -> tuple[CameraFit, IntArray] | None:
     return fit, grid
 
 
-def _azimuth_step(points: FloatArray, grid: IntArray) -> float | None:
+def _azimuth_step(points: FloatArray, grid: IndexArray) -> float | None:
     """Median turn, in radians, from a column to the next."""
     is_pair = (grid[:, :-1] >= 0) & (grid[:, 1:] >= 0)
     if not is_pair.any():
@@ -83,7 +83,7 @@ def _azimuth_step(points: FloatArray, grid: IntArray) -> float | None:
     return step if abs(step) > 0 else None
 
 
-def _begun_elsewhere(grid: IntArray, step: float) -> IntArray:
+def _begun_elsewhere(grid: IndexArray, step: float) -> IndexArray:
     """The grid, begun half a turn later if it goes around and there are points at its seam."""
     width = grid.shape[1]
     missing = round(2 * np.pi / abs(step)) - width
@@ -92,7 +92,7 @@ def _begun_elsewhere(grid: IntArray, step: float) -> IntArray:
         or not -1 <= missing <= width // 100 + 1
     ):
         return grid
-    gap = np.full((grid.shape[0], max(missing, 0)), -1, dtype=np.int64)
+    gap = np.full((grid.shape[0], max(missing, 0)), -1, dtype=grid.dtype)
     half = width // 2
     return np.concatenate([grid[:, half:], gap, grid[:, :half]], axis=1)
 

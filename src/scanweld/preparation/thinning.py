@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.arrays import FloatArray, IndexArray, IntArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.scan import RangeScan
 
@@ -31,7 +31,7 @@ def thinned(scan: RangeScan, max_points: int) -> RangeScan:
     return replace(smaller, notes=(*scan.notes, note))
 
 
-def _strided(scan: RangeScan, grid: IntArray, max_points: int) -> tuple[RangeScan, str]:
+def _strided(scan: RangeScan, grid: IndexArray, max_points: int) -> tuple[RangeScan, str]:
     """Every k-th row and column of the grid, k as small as it can be."""
     too_many = max((grid >= 0).sum(), grid.size / CELLS_PER_POINT) / max_points
     step = max(2, int(np.ceil(np.sqrt(too_many))))

@@ -81,13 +81,46 @@ def refine_poses(
         contours: Of all scans; without them there is no contour term.
         workers: Threads; the result is the same for any number.
     """
+    if len(world_from_sensor) < 2:
+        return Refinement(poses=dict(world_from_sensor), pairs={}, rms=0.0, step=0.0)
+    sources = {k: surface_source(scans[k], NUM_POINTS) for k in sorted(world_from_sensor)}
+    poses, step = _moved(scans, sources, world_from_sensor, pairs, config, contours, workers)
+    diameter = _diameter(scans, poses)
+    radius = config.match_diameters[1] * diameter
+    surface = match_surfaces(sources, poses, pairs, radius, workers)
+    terms = weighted_terms(surface, [], poses, 0.0, _noise(scans, poses))
+    rms = _rms(terms)
+    logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
+    return Refinement(poses=poses, pairs=_residuals(terms), rms=rms, step=step)
+
+
+def refined_poses(
+    scans: Sequence[PreparedScan],
+    world_from_sensor: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
+    config: RefineConfig,
+    contours: ContourMatcher | None = None,
+    workers: int = 1,
+) -> dict[int, Pose]:
+    """The poses of ``refine_poses`` alone, which spares a round of matches."""
+    if len(world_from_sensor) < 2:
+        return dict(world_from_sensor)
+    sources = {k: surface_source(scans[k], NUM_POINTS) for k in sorted(world_from_sensor)}
+    return _moved(scans, sources, world_from_sensor, pairs, config, contours, workers)[0]
+
+
+def _moved(
+    scans: Sequence[PreparedScan],
+    sources: Mapping[int, SurfaceSource],
+    world_from_sensor: Mapping[int, Pose],
+    pairs: Collection[tuple[int, int]],
+    config: RefineConfig,
+    contours: ContourMatcher | None,
+    workers: int,
+) -> tuple[dict[int, Pose], float]:
+    """Refined poses, and the last step as a share of the diameter."""
     poses = dict(sorted(world_from_sensor.items()))
-    if len(poses) < 2:
-        return Refinement(poses=poses, pairs={}, rms=0.0, step=0.0)
-    sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
-    diameter = float(np.median([scans[k].diameter for k in poses]))
-    pixel = float(np.median([scans[k].image.pixel for k in poses]))
-    noise = SURFACE_NOISE_DIAMETERS * diameter, OUTLINE_NOISE_PIXELS * pixel
+    diameter, noise = _diameter(scans, poses), _noise(scans, poses)
     contour_rounds = NUM_CONTOUR_ROUNDS if config.contour_weight > 0 else 0
     outlines = None if contours is None else Outlines(contours=contours, workers=workers)
     step = 0.0
@@ -104,11 +137,17 @@ def refine_poses(
         )
         step = moved / diameter
         logger.debug("refinement: radius %.4f, step %.2e of the diameter", radius, step)
-    surface = match_surfaces(sources, poses, pairs, config.match_diameters[1] * diameter, workers)
-    terms = weighted_terms(surface, [], poses, 0.0, noise)
-    rms = _rms(terms)
-    logger.debug("refined %d poses: rms %.3g, last step %.1e diameters", len(poses), rms, step)
-    return Refinement(poses=poses, pairs=_residuals(terms), rms=rms, step=step)
+    return poses, step
+
+
+def _diameter(scans: Sequence[PreparedScan], poses: Mapping[int, Pose]) -> float:
+    return float(np.median([scans[k].diameter for k in poses]))
+
+
+def _noise(scans: Sequence[PreparedScan], poses: Mapping[int, Pose]) -> tuple[float, float]:
+    """Least spread of the surface and of the contour residuals, in the scans' unit."""
+    pixel = float(np.median([scans[k].image.pixel for k in poses]))
+    return SURFACE_NOISE_DIAMETERS * _diameter(scans, poses), OUTLINE_NOISE_PIXELS * pixel
 
 
 def scan_rms(refinement: Refinement) -> dict[int, float]:

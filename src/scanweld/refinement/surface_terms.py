@@ -133,6 +133,7 @@ def _closest_planes(  # pragma: no cover
         fx, fy, fz = x, y, z
         qx = qy = qz = a = b = c = 0.0
         distance = np.nan
+        row, column = -1, -1
         for _ in range(NUM_WALKS):
             if is_pinhole and fz <= 0.0:
                 distance = np.nan
@@ -143,6 +144,9 @@ def _closest_planes(  # pragma: no cover
             if u < 0 or v < 0 or u >= width or v >= height or not is_usable[v, u]:
                 distance = np.nan
                 break
+            if v == row and u == column:  # all further walks end here
+                break
+            row, column = v, u
             qz = stretch * depth[v, u]
             scale = qz if is_pinhole else 1.0
             qx = (u - camera[3]) / camera[1] * scale
