@@ -4,6 +4,7 @@ import gzip
 import re
 import sys
 import zipfile
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -283,6 +284,37 @@ def test_shades_on_no_known_scale_are_left_out_with_a_note(
     assert any(re.match(rf"{what}.* ignored: on no known scale", note) for note in scan.notes)
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "note"),
+    [
+        ("a.obj", lambda data: b"\xef\xbb\xbf" + data, ""),
+        ("a.ply", lambda data: b"\xef\xbb\xbf" + data, ""),
+        ("a.ptx", lambda data: data.replace(b"\n", b"\r"), ""),
+        ("a.stl", bytes.upper, ""),
+        ("a.vtk", lambda data: data.replace(b"ASCII", b"ascii").replace(b"POINTS", b"points"), ""),
+        ("a.ply", lambda data: data.replace(b"other", b"strip"), "elements ignored: strip"),
+        ("a.ply", lambda data: data.replace(b"num_cols 3", b"num_cols 9"), "9 x 1, are not its"),
+    ],
+)  # fmt: skip
+def test_odd_dresses_change_nothing(
+    name: str, change: Callable[[bytes], bytes], note: str, tmp_path: Path
+):
+    samples = {
+        "a.obj": b"v 1 2 3\nv 4 5 6\nv 7 8 10\n",
+        "a.ply": b"ply\nformat ascii 1.0\nobj_info num_cols 3\nobj_info num_rows 1\n"
+        b"element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        b"element other 0\nend_header\n"
+        b"1 2 3\n4 5 6\n7 8 10\n",
+        "a.ptx": SAMPLES["two.ptx"](),
+        "a.stl": b"solid a\nvertex 1 2 3\nvertex 4 5 6\nvertex 7 8 10\nendsolid a\n",
+        "a.vtk": vtk(is_binary=False),
+    }
+    plain = read_scan(write(tmp_path, name, samples[name]))
+    odd = read_scan(write(tmp_path, name, change(samples[name])))
+    np.testing.assert_array_equal(odd.points, plain.points)
+    assert note in "; ".join(odd.notes)
+
+
 def test_bombs_are_refused(tmp_path: Path):
     bomb = gzip.compress(bytes(SMALL + 1))
     with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
@@ -333,6 +365,13 @@ def test_bombs_are_refused(tmp_path: Path):
         ("a.ptx", b"3\n2\n0 0 0\n", "no scan of a PTX file begins here"),
         ("a.ptx", SAMPLES["two.ptx"]()[:-900], "scan 2 has"),
         ("a.ptx", SAMPLES["two.ptx"]() + b"7\n", "line 105: no scan"),
+        (
+            "a.glb",
+            glb().replace(b'"asset": {"version": "2.0"}', b'"extensionsRequired":["EX"]'),
+            "needs EX, which is not read",
+        ),
+        ("a.stl", SAMPLES["binary.stl"]() + b"\0" * 7, "goes on behind its"),
+        ("a.xyz.gz", b"0 0 1\n1 0 1\n", "is not packed; take .gz off"),
     ],
 )
 def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_path: Path):
@@ -355,6 +394,9 @@ def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_p
             "is a pointer of Git LFS; fetch",
         ),
         ("a.stl", b"PK\3\4abc", "is a ZIP archive; unpack it"),
+        ("a.xyz", b"BZh91AY", "is packed; unpack it"),
+        ("a.xyz.gz", gzip.compress(gzip.compress(b"0 0 1\n", mtime=0), mtime=0), "packed twice"),
+        ("a.obj", "v 1 2 3\n".encode("utf-16"), "is text in UTF-16; save it as UTF-8"),
         ("a.pcd", b"\x89PNG\r\n", "is a picture or a document; leave it out"),
         (
             "a.xyz",

@@ -127,7 +127,8 @@ def _scans_among(candidates: list[Path], where: str, named: str = "") -> list[Pa
         formats = ", ".join(known)
         raise InputError(f"{where} holds no scans{told}; scanweld looks for {formats} there")
     if found:
-        is_meant = any(foreign_kind(path) is not None for path in others)
+        texts = [path for path in others if suffix_of(path) in left_out]
+        is_meant = len(texts) > len(scans) or any(map(foreign_kind, others))
         logger.log(logging.WARNING if is_meant else logging.INFO, "%s also holds %s", where, found)
     return scans
 

@@ -11,8 +11,10 @@ from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 
 _BLOCK = 2**22
-_NOT_A_NUMBER = re.compile(rb"[+-]?(nan(\(\w*\))?|1\.?#(qnan|snan|ind)\d*)", re.IGNORECASE)
-"""How some C libraries print what is not a number: nan(ind), -1.#IND00."""
+_NOT_A_NUMBER = re.compile(
+    rb"[+-]?(nan(\(\w*\))?|1\.?#(qnan|snan|ind|inf)\d*)|#?n/?a|null|none", re.IGNORECASE
+)
+"""How C libraries print what is not finite (nan(ind), -1.#IND00), and tables what is not there."""
 _FORTRAN = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 """Double precision as Fortran prints it: 1.5D+02."""
 _EXPONENT = bytes.maketrans(b"dD", b"ee")
@@ -168,7 +170,7 @@ def _number(path: Path, word: bytes, line_number: int) -> float:
         return float(word.translate(_EXPONENT))
     if _NOT_A_NUMBER.fullmatch(word):
         return float("nan")
-    shown = word[:40].decode("ascii", errors="replace")
+    shown = word[:40].decode("utf-8", errors="replace")
     raise ReadError(
         f"{path}: line {line_number}: {shown!r} is not a number; correct it or export it anew"
     )
