@@ -472,6 +472,32 @@ def test_arrays_with_named_fields(tmp_path: Path):
             read_scan(write(tmp_path, "a.npy", npy(odd)))
 
 
+def test_e57_may_tell_angles_and_ranges(tmp_path: Path):
+    library = pytest.importorskip("pye57.libe57")
+    names = ("sphericalRange", "sphericalAzimuth", "sphericalElevation", "sphericalInvalidState")
+    table = np.array([[2, 0, 0, 0], [1, np.pi / 2, 0, 0], [3, 0, np.pi / 2, 0], [9, 0, 0, 1]]).T
+    file = library.ImageFile(str(tmp_path / "a.e57"), "w")
+    text, root = (lambda value: library.StringNode(file, value)), file.root()
+    row, scan = library.StructureNode(file), library.StructureNode(file)
+    buffers, scans = library.VectorSourceDestBuffer(), library.VectorNode(file, True)
+    for name, column in zip(names, table.copy(), strict=True):
+        row.set(name, library.FloatNode(file, 0.0, library.E57_DOUBLE, -9.0, 9.0))
+        buffers.append(library.SourceDestBuffer(file, name, column, len(column), True, True))
+    root.set("formatName", text("ASTM E57 3D Imaging Data File"))
+    root.set("data3D", scans)
+    scans.append(scan)
+    scan.set("guid", text("one"))
+    points = library.CompressedVectorNode(file, row, library.VectorNode(file, True))
+    scan.set("points", points)
+    writer = points.writer(buffers)
+    writer.write(table.shape[1])
+    writer.close()
+    file.close()
+    found = read_scan(tmp_path / "a.e57")
+    np.testing.assert_allclose(found.points, [[2, 0, 0], [0, 1, 0], [0, 0, 3]], atol=1e-15)
+    assert found.num_dropped == 1
+
+
 def test_e57_numbers_may_be_scaled():
     libe57 = pytest.importorskip("pye57.libe57")
     from scanweld.io.scan_formats.e57 import number_of
