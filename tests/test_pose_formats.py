@@ -247,6 +247,7 @@ def entries(tmp_path: Path, labels: Sequence[str]) -> Path:
     [
         ("../raw/a.ply", ["a", "b"], "a"),
         ("C:\\raw\\a.ply", ["a", "b"], "a"),
+        ("raw/a.ply.gz", ["a", "b"], "a"),
         ("a.v1.ply", ["a", "a.v1"], "a.v1"),
         ("a.v1.ply", ["a"], None),
         ("left/a.ply", ["left/a", "right/a"], "left/a"),
