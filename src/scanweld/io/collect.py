@@ -86,16 +86,17 @@ def _own_names(path: Path) -> list[str]:
 
 def _expand(each: Path | str) -> list[Path]:
     path = Path(each)
-    if path.is_dir():
+    if os.path.isdir(path):  # of a name that is too long the methods of Path raise
         try:
             return _scans_among(sorted(path.iterdir()), f"{path}: the folder")
         except OSError as error:
             raise ReadError(f"{path}: cannot be listed ({error.strerror}); check it") from error
-    if not path.exists() and glob.has_magic(str(each)):
+    exists = os.path.exists(path)
+    if not exists and glob.has_magic(str(each)):
         matches = [Path(match) for match in sorted(glob.glob(str(each)))]
         return _scans_among(matches, f"{each}: the pattern", suffix_of(path))
-    if not path.exists():
-        link = path.is_symlink()
+    if not exists:
+        link = os.path.islink(path)
         told = (
             "is a link that leads nowhere; copy the file"
             if link
