@@ -57,6 +57,7 @@ def reason(folder: Path, text: str, suffix: str = "txt") -> str:
          [POINTS, COLORS[:, ::-1], NORMALS]),
         ("Points:0,Points:1,Points:2,Normals:0,Normals:1,Normals:2,R,G,B",
          [POINTS, NORMALS, COLORS]),
+        ("X_pos Y_pos Z_pos nx ny nz r g b", [POINTS, NORMALS, COLORS]),
         ("12\nx y z nx ny nz r g b", [POINTS, NORMALS, COLORS]),
         ("x y z nx ny nz r g b", [INDEX, POINTS, NORMALS, COLORS]),  # as R writes tables
         (",x,y,z,nx,ny,nz,r,g,b", [INDEX, POINTS, NORMALS, COLORS]),  # as pandas does

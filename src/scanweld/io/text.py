@@ -61,10 +61,10 @@ def _numbers(text: bytes) -> FloatArray:
     values, begins = _simple_numbers(np.frombuffer(text, np.uint8))
     left = np.flatnonzero(np.isnan(values))
     if 2 * len(left) > len(values):
-        return np.fromiter(map(_plain_number, text.split()), dtype=np.float64)
+        return np.fromiter(map(plain_number, text.split()), dtype=np.float64)
     ends = np.append(begins[1:], len(text))[left]
     values[left] = [
-        _plain_number(text[begin:end])
+        plain_number(text[begin:end])
         for begin, end in zip(begins[left].tolist(), ends.tolist(), strict=True)
     ]
     return values
@@ -146,7 +146,7 @@ def _words_per_line(text: ByteArray) -> IntArray:  # pragma: no cover - compiled
 def is_number(word: bytes) -> bool:
     """Whether a word can be read as a number, by ``float`` and by ``parse_numbers``."""
     try:
-        _plain_number(word)
+        plain_number(word)
     except ValueError:
         return False
     return True
@@ -157,7 +157,12 @@ def is_any_number(word: bytes) -> bool:
     return is_number(word) or bool(_NOT_A_NUMBER.fullmatch(word) or _FORTRAN.fullmatch(word))
 
 
-def _plain_number(word: bytes) -> float:
+def plain_number(word: bytes) -> float:
+    """A word as a number.
+
+    Raises:
+        ValueError: If it is none.
+    """
     if b"_" in word:  # groups of digits to Python, and to nobody who writes scans
         raise ValueError("underscore")
     return float(word)

@@ -12,6 +12,7 @@ from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.text import is_any_number
 from scanweld.io.text_head import axis_name, row_cells
 
+_FIRST_LINE = slice(0, 2**16)
 FIRST_ROWS = slice(0, 1000)
 """Most that is not so is not so here already, and the rest need not be looked at."""
 INDEX_NOTE = "first column left out: it counts the points"
@@ -63,12 +64,12 @@ def is_known(name: str) -> bool:
 
 def without_words(text: bytes, names: Sequence[str]) -> bytes:
     """The text with ``nan`` for the words of columns whose names are not read."""
-    lines = [line.decode("latin-1") for line in text.splitlines()] if names else [""]
-    cells = row_cells(lines[0])
+    first = text[_FIRST_LINE].splitlines()[:1]
+    cells = [cell for line in first for cell in row_cells(line.decode("latin-1"))]
     other = [k for k, name in enumerate(names) if not is_known(name)]
     if len(cells) != len(names) or all(is_any_number(cells[k].encode()) for k in other):
         return text
-    rows = map(row_cells, lines)
+    rows = (row_cells(line.decode("latin-1")) for line in text.splitlines())
     left = (
         ["nan" if k in other and len(row) == len(names) else row[k] for k in range(len(row))]
         for row in rows

@@ -113,7 +113,7 @@ def row_cells(line: str) -> list[str]:
 def axis_name(name: str) -> str:
     """x, y or z where a name means a coordinate; otherwise the name itself."""
     for axis, number in zip("xyz", "012", strict=True):
-        usual = (f"{axis}coord", f"{axis}coordinate", f"coord{axis}", f"pos{axis}")
+        usual = (f"{axis}coord", f"{axis}coordinate", f"coord{axis}", f"pos{axis}", f"{axis}pos")
         if name in (axis, *usual, f"position{axis}", f"points{number}"):
             return axis
     return name
