@@ -131,8 +131,9 @@ distortion_coefficients: {rows: 1, cols: 5, data: [%s]}
     ],
 )  # fmt: skip
 def test_intrinsics_of_every_form_are_the_same(text: str, wanted: Intrinsics, tmp_path: Path):
-    (tmp_path / "a").write_text(text)
-    assert read_intrinsics(tmp_path / "a") == wanted
+    for encoding in ("utf-8", "utf-16"):
+        (tmp_path / "a").write_text(text, encoding=encoding)
+        assert read_intrinsics(tmp_path / "a") == wanted
 
 
 def test_lens_and_scale_come_with_the_intrinsics(tmp_path: Path):
