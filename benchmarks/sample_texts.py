@@ -18,6 +18,7 @@ SCANS = {
     "comma.asc": "0,25\t0\t1,5\n1\t0,125\t2\n0\t1\t3,75\n1,5\t1\t1\n",
     "names.csv": 'a scan\n"Point";"X [m]";"Y";"Z";"R";"G";"B";"Nx";"Ny";"Nz"\n'
     "1;0;0;1,5;255;0;0;0;0;1\n2;1;0;2;0;255;0;0;1;0\n3;0,5;1;3;0;0;255;1;0;0\n",
+    "words.csv": 'time,x,y,z,name\n07:01,0,0,1,"a, b"\n07:02,1,0,2,\n07:03,0,1,NA,c\n',
     "a.obj": "# o\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvn 0 0 1\nf 1//1 2/3 -1\n",
     "a.off": "COFF\n3 1 0\n0 0 0 9 9 9 255\n1 0 0 9 9 9 255\n0 1 0 9 9 9 255\n3 0 1 2\n",
     "a.stl": "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"

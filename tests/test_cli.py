@@ -228,6 +228,16 @@ def test_bad_input_exits_with_1_one_line_and_nothing_written(
     assert sorted(Path().rglob("*")) == before
 
 
+@pytest.mark.parametrize("command", ["info", "report", "fuse scans -o x --poses", "evaluate"])
+def test_names_that_are_too_long_are_one_line(
+    scans: Path, command: str, capsys: pytest.CaptureFixture[str]
+):
+    names = ["m" * 300 + ".json"] * (1 + (command == "evaluate"))
+    assert scanweld(*command.split(), *names) == 1
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.startswith("scanweld: error: ") and "m.json" in line
+
+
 def test_unreadable_files_are_named_while_the_rest_goes_on(
     scans: Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -5,11 +5,13 @@ import os
 import sys
 from itertools import permutations
 from pathlib import Path
+from typing import Never
 
 import pytest
 
 from scanweld.errors import InputError, ReadError
 from scanweld.io import collect, natural_key, read_scan
+from scanweld.io.depth.capture import DepthOptions, as_named, collect_named
 from scanweld.io.not_scans import FOREIGN
 from scanweld.io.scan_formats.registry import formats_by_suffix
 
@@ -89,6 +91,20 @@ def test_what_is_missing_or_of_an_unknown_format_is_an_error(folder: Path):
     for what in ("folder.ply", "*.las", "none*.ply"):
         with pytest.raises(InputError, match="holds no scans"):
             collect([os.path.join(folder, what)])
+
+
+def test_a_folder_that_cannot_be_listed_and_a_name_that_cannot_be_are_one_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    with pytest.raises(ReadError, match="there is no such file"):
+        collect(["n" * 300 + ".ply", folder])
+
+    def refuse(path: Path) -> Never:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "is_file", refuse)
+    with pytest.raises(ReadError, match=r"cannot be listed \(Permission denied\)"):
+        collect_named(as_named([folder], DepthOptions()))
 
 
 def test_a_folder_without_scans_says_what_it_holds_and_what_to_export(tmp_path: Path):

@@ -131,8 +131,9 @@ distortion_coefficients: {rows: 1, cols: 5, data: [%s]}
     ],
 )  # fmt: skip
 def test_intrinsics_of_every_form_are_the_same(text: str, wanted: Intrinsics, tmp_path: Path):
-    (tmp_path / "a").write_text(text)
-    assert read_intrinsics(tmp_path / "a") == wanted
+    for encoding in ("utf-8", "utf-16"):
+        (tmp_path / "a").write_text(text, encoding=encoding)
+        assert read_intrinsics(tmp_path / "a") == wanted
 
 
 def test_lens_and_scale_come_with_the_intrinsics(tmp_path: Path):
@@ -242,6 +243,9 @@ def bad_sets(folder: Path) -> list[tuple[list[str], str]]:
     black = put(folder / "black" / "000.png", np.zeros((60, 80), np.uint8)).parent
     empty = str(capture(folder / "empty", stored(1000) * 0))
     photo = put(folder / "photo.png", np.zeros((60, 80, 3), np.uint8))
+    np.save(black / "bytes.npy", np.ones((60, 80), np.uint8))
+    pages = [Image.fromarray(stored(1000))] * 2
+    pages[0].save(black / "two.tif", save_all=True, append_images=pages[1:])
     torn = folder / "torn.png"
     torn.write_bytes(alone.read_bytes()[:200])
     (folder / "cam.txt").write_text(f"{TEXT} 640 480")
@@ -261,6 +265,8 @@ def bad_sets(folder: Path) -> list[tuple[list[str], str]]:
         ([str(photo), "--intrinsics", cam], "a picture"),
         ([str(torn), "--intrinsics", cam], "cannot be read as an image"),
         ([str(folder), "--intrinsics", cam, "--depth-max", "1"], "a picture"),
+        ([str(black / "bytes.npy"), "--intrinsics", cam], "holds uint8"),
+        ([str(black / "two.tif"), "--intrinsics", cam], "holds 2 images"),
         ([str(folder / "none.png")], "there is no such file"),
         ([cam, "--depth-max", "1"], "no depth image"),
     ]

@@ -50,8 +50,8 @@ def tum(folder: Path) -> None:
     for k in range(2):
         put(folder / "depth" / f"{k}.500000.png", stored(5000))
         put(folder / "rgb" / f"{k}.510000.png", COLORS)
-    text(folder, "depth.txt", "# time file\n0.5 depth/0.500000.png\n1.5 depth/1.500000.png\n")
-    text(folder, "rgb.txt", "0.51 rgb/0.510000.png\n1.51 rgb/1.510000.png\n3.0 rgb/gone.png\n")
+    text(folder, "depth.txt", "# time file\n0.5 depth/0.500000.png\n1.5 depth\\1.500000.png\n")
+    text(folder, "rgb.txt", "0.51 rgb/0.510000.png\n1.51 rgb\\1.510000.png\n3.0 rgb/gone.png\n")
     lines = ["# time tx ty tz qx qy qz qw", "0.1 0 0 0 0 0 0 1"]
     for time, pose in zip((0.495, 1.505), POSES, strict=True):
         numbers = [*pose.translation, *Rotation.from_matrix(pose.rotation).as_quat()]

@@ -152,6 +152,8 @@ def test_three_more_columns_are_normals_or_colors(tmp_path: Path):
         ("a.obj", "v 0 0 0\nf 1 -2 1\n", "line 2: 'f 1 -2 1' is broken"),
         ("a.obj", "v 0 0 0\nf 1 2 1\n", "name point 1, but"),
         ("a.obj", "v 0 0\n", r"\[2\] numbers"),
+        ("a.obj", "v 1_0 0 0\n", "line 1: 'v 1_0 0 0' is broken"),
+        ("a.off", "OFF\n1 0 0\n0 1_0 0\n", "line 3: '0 1_0 0' is broken"),
         ("a.off", "hello\n", "not an OFF file"),
         ("a.off", "OFF\n", "broken"),
         ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n", "2 lines for 3 vertices and 1 faces"),

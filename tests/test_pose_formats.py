@@ -87,9 +87,10 @@ def test_files_by_hand_are_read_as_their_definition_says(tmp_path: Path, name: s
     """Whatever their suffix, where the content tells the format."""
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)
-    path.write_bytes(KNOWN[name].encode())
-    poses = read(path.parent if path.parent.name == "cc" else path, ["one"])
-    assert np.abs(poses["one"].matrix() - QUARTER.matrix()).max() < 1e-12
+    for encoding in ("utf-16", "utf-8-sig", "utf-8"):
+        path.write_bytes(KNOWN[name].encode(encoding))
+        poses = read(path.parent if path.parent.name == "cc" else path, ["one"])
+        assert np.abs(poses["one"].matrix() - QUARTER.matrix()).max() < 1e-12
     if not name.startswith("cc/"):
         other = path.rename(tmp_path / ("poses.js" if "json" in name else "poses.dat"))
         assert np.allclose(read(other, ["one"])["one"].matrix(), QUARTER.matrix())
@@ -247,6 +248,7 @@ def entries(tmp_path: Path, labels: Sequence[str]) -> Path:
     [
         ("../raw/a.ply", ["a", "b"], "a"),
         ("C:\\raw\\a.ply", ["a", "b"], "a"),
+        ("raw/a.ply.gz", ["a", "b"], "a"),
         ("a.v1.ply", ["a", "a.v1"], "a.v1"),
         ("a.v1.ply", ["a"], None),
         ("left/a.ply", ["left/a", "right/a"], "left/a"),

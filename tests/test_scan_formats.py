@@ -4,6 +4,7 @@ import gzip
 import re
 import sys
 import zipfile
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -283,6 +284,38 @@ def test_shades_on_no_known_scale_are_left_out_with_a_note(
     assert any(re.match(rf"{what}.* ignored: on no known scale", note) for note in scan.notes)
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "note"),
+    [
+        ("a.obj", lambda data: b"\xef\xbb\xbf" + data, ""),
+        ("a.ply", lambda data: b"\xef\xbb\xbf" + data, ""),
+        ("a.ptx", lambda data: data.replace(b"\n", b"\r"), ""),
+        ("a.obj", lambda data: data + b"vn 0 0 1\n", "normals left out"),
+        ("a.stl", bytes.upper, ""),
+        ("a.vtk", lambda data: data.replace(b"ASCII", b"ascii").replace(b"POINTS", b"points"), ""),
+        ("a.ply", lambda data: data.replace(b"other", b"strip"), "elements ignored: strip"),
+        ("a.ply", lambda data: data.replace(b"num_cols 3", b"num_cols 9"), "9 x 1, are not its"),
+    ],
+)  # fmt: skip
+def test_odd_dresses_change_nothing(
+    name: str, change: Callable[[bytes], bytes], note: str, tmp_path: Path
+):
+    samples = {
+        "a.obj": b"v 1 2 3\nv 4 5 6\nv 7 8 10\n",
+        "a.ply": b"ply\nformat ascii 1.0\nobj_info num_cols 3\nobj_info num_rows 1\n"
+        b"element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        b"element other 0\nend_header\n"
+        b"1 2 3\n4 5 6\n7 8 10\n",
+        "a.ptx": SAMPLES["two.ptx"](),
+        "a.stl": b"solid a\nvertex 1 2 3\nvertex 4 5 6\nvertex 7 8 10\nendsolid a\n",
+        "a.vtk": vtk(is_binary=False),
+    }
+    plain = read_scan(write(tmp_path, name, samples[name]))
+    odd = read_scan(write(tmp_path, name, change(samples[name])))
+    np.testing.assert_array_equal(odd.points, plain.points)
+    assert note in "; ".join(odd.notes)
+
+
 def test_bombs_are_refused(tmp_path: Path):
     bomb = gzip.compress(bytes(SMALL + 1))
     with pytest.raises(ReadError, match="unpacks to more than 64 MB"):
@@ -300,6 +333,7 @@ def test_bombs_are_refused(tmp_path: Path):
         ("a.pcd", b"hello\n", "no line DATA"),
         ("a.pcd", pcd_head("x y", "4 4", "F F", "ascii") + b"0 0\n" * 42, "lack x, y or z"),
         ("a.pcd", pcd_head("x y z", "4 4", "F F F", "ascii"), "as many SIZE"),
+        ("a.pcd", pcd_head("x y z x", "4 4 4 4", "F F F F", "ascii"), "two of its FIELDS"),
         ("a.pcd", pcd_head("x y z", "4 4 3", "F F F", "ascii"), "SIZE 3"),
         ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "zip"), "unknown DATA 'zip'"),
         ("a.pcd", pcd_head("x y z", "4 4 4", "F F F", "ascii") + b"0 0 0\n", "is shorter than 42"),
@@ -333,6 +367,13 @@ def test_bombs_are_refused(tmp_path: Path):
         ("a.ptx", b"3\n2\n0 0 0\n", "no scan of a PTX file begins here"),
         ("a.ptx", SAMPLES["two.ptx"]()[:-900], "scan 2 has"),
         ("a.ptx", SAMPLES["two.ptx"]() + b"7\n", "line 105: no scan"),
+        (
+            "a.glb",
+            glb().replace(b'"asset": {"version": "2.0"}', b'"extensionsRequired":["EX"]'),
+            "needs EX, which is not read",
+        ),
+        ("a.stl", SAMPLES["binary.stl"]() + b"\0" * 7, "goes on behind its"),
+        ("a.xyz.gz", b"0 0 1\n1 0 1\n", "is not packed; take .gz off"),
     ],
 )
 def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_path: Path):
@@ -355,6 +396,9 @@ def test_broken_files_say_what_is_wrong(name: str, data: bytes, says: str, tmp_p
             "is a pointer of Git LFS; fetch",
         ),
         ("a.stl", b"PK\3\4abc", "is a ZIP archive; unpack it"),
+        ("a.xyz", b"BZh91AY", "is packed; unpack it"),
+        ("a.xyz.gz", gzip.compress(gzip.compress(b"0 0 1\n", mtime=0), mtime=0), "packed twice"),
+        ("a.obj", "v 1 2 3\n".encode("utf-16"), "is text in UTF-16; save it as UTF-8"),
         ("a.pcd", b"\x89PNG\r\n", "is a picture or a document; leave it out"),
         (
             "a.xyz",
@@ -428,6 +472,32 @@ def test_arrays_with_named_fields(tmp_path: Path):
     for odd in (np.zeros(9, [("x", "<f4"), ("y", "<f4")]), records[None], records[:0]):
         with pytest.raises(ReadError, match=r"records .* save x, y and z"):
             read_scan(write(tmp_path, "a.npy", npy(odd)))
+
+
+def test_e57_may_tell_angles_and_ranges(tmp_path: Path):
+    library = pytest.importorskip("pye57.libe57")
+    names = ("sphericalRange", "sphericalAzimuth", "sphericalElevation", "sphericalInvalidState")
+    table = np.array([[2, 0, 0, 0], [1, np.pi / 2, 0, 0], [3, 0, np.pi / 2, 0], [9, 0, 0, 1]]).T
+    file = library.ImageFile(str(tmp_path / "a.e57"), "w")
+    text, root = (lambda value: library.StringNode(file, value)), file.root()
+    row, scan = library.StructureNode(file), library.StructureNode(file)
+    buffers, scans = library.VectorSourceDestBuffer(), library.VectorNode(file, True)
+    for name, column in zip(names, table.copy(), strict=True):
+        row.set(name, library.FloatNode(file, 0.0, library.E57_DOUBLE, -9.0, 9.0))
+        buffers.append(library.SourceDestBuffer(file, name, column, len(column), True, True))
+    root.set("formatName", text("ASTM E57 3D Imaging Data File"))
+    root.set("data3D", scans)
+    scans.append(scan)
+    scan.set("guid", text("one"))
+    points = library.CompressedVectorNode(file, row, library.VectorNode(file, True))
+    scan.set("points", points)
+    writer = points.writer(buffers)
+    writer.write(table.shape[1])
+    writer.close()
+    file.close()
+    found = read_scan(tmp_path / "a.e57")
+    np.testing.assert_allclose(found.points, [[2, 0, 0], [0, 1, 0], [0, 0, 3]], atol=1e-15)
+    assert found.num_dropped == 1
 
 
 def test_e57_numbers_may_be_scaled():

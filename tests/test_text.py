@@ -57,6 +57,7 @@ def reason(folder: Path, text: str, suffix: str = "txt") -> str:
          [POINTS, COLORS[:, ::-1], NORMALS]),
         ("Points:0,Points:1,Points:2,Normals:0,Normals:1,Normals:2,R,G,B",
          [POINTS, NORMALS, COLORS]),
+        ("X_pos Y_pos Z_pos nx ny nz r g b", [POINTS, NORMALS, COLORS]),
         ("12\nx y z nx ny nz r g b", [POINTS, NORMALS, COLORS]),
         ("x y z nx ny nz r g b", [INDEX, POINTS, NORMALS, COLORS]),  # as R writes tables
         (",x,y,z,nx,ny,nz,r,g,b", [INDEX, POINTS, NORMALS, COLORS]),  # as pandas does
@@ -77,6 +78,8 @@ def test_columns_of_other_names_are_ignored_and_told(tmp_path: Path):
     same(scan.points, POINTS)
     same(scan.colors, COLORS)
     assert scan.notes == ("columns ignored: time, curvature",)
+    scan = read(tmp_path, "x,y,z,Zeit-Größe,\u65f6\n1,2,3,7 Uhr,9\n")
+    assert scan.notes == ("columns ignored: zeitgrösse, \u65f6",)
     scan = read(tmp_path, "x y z Intensity\n" + table(POINTS, COLORS[:, :1] * 257))
     same(scan.colors, np.repeat(COLORS[:, :1], 3, axis=1))
     scan = read(tmp_path, "x y z r g b\n" + table(POINTS, -1 - COLORS))
@@ -180,6 +183,15 @@ def test_decimal_commas_are_read_right_where_they_can_be_nothing_else(mark: str,
         ("z y x i\n4 5 6\n", "4 column names .* above 3 columns"),
         ("x y z r g b\n4 5 6 7\n", "6 column names .* above 4 columns"),
         ("x y z x\n4 5 6 7\n", "two columns are named x"),
+        ("1 234,5;2 000,1;3,0\n", "line 1: '1 234,5;.*: a space in its numbers may separate"),
+        ("1 234.5\t2 000.1\t3\n", "a space in its numbers may separate thousands"),
+        ("1 234.5 2 000.1 3 7\n", "a space in its numbers may separate thousands"),
+        ("1\xa0234.5 2 3\n", r"line 1: '1\\xa0234.5' is not a number"),
+        ("0.1+03 0.2+01 3.5\n1 2 3\n", "'0.1.03' in its first line of numbers"),
+        ("\u22121 \u22122 \u22123\n1 2 3\n", "in its first line of numbers is not a number"),
+        ("ncols 2\nnrows 1\nxll 0\nyll 0\ncellsize 1\n1 2 3\n", "raster of heights"),
+        ("x,y,z,t\n1,2,3,wall\n4,o,6,door\n", "line 3: 'o' is not a number"),
+        ("x y z\n1 2 3 wall\n", "line 1: 'x' is not a number|'wall'"),
         ("a b\n" * 6 + "1 2 3\n", "6 lines of words above the numbers"),
         ("x y z\n", "holds no points"),
     ],
@@ -201,6 +213,12 @@ def test_what_is_not_certain_is_refused_with_its_reason(text: str, says: str, tm
         (",0,1,2\n0,1.5,0,1\n1,2.5,7,1\n2,.5,9,3\n", [[1.5, 0, 1], [2.5, 7, 1], [0.5, 9, 3]]),
         ("inf 0 0 1e200\ninf 1 0 inf\n1 2 3 nan\n", [[1, 2, 3]]),
         ("0 0 1e300 1e200 inf 9\n1 2 -1e200 1e200 nan -inf\n", [[0, 0, 1e300], [1, 2, -1e200]]),
+        ("x y z\n1 2 3\n4 #N/A 6\n7 NA 9\nnull 1 -1.#INF\n4 5 6 # 7\n", [[1, 2, 3], [4, 5, 6]]),
+        ('t,x,y,z,l\n07:00:01,1,2,3,"a, b"\n07:00:02,4,5,6,c\n', [[1, 2, 3], [4, 5, 6]]),
+        ("x;y;z;name\n1,5;2,5;3;a\n", [[1.5, 2.5, 3]]),
+        ("x,y,z\nmm,mm,mm\n1.5,2,3\n", [[1.5, 2, 3]]),
+        ("1 2;3\n4\t;5;\t6\n", [[1, 2, 3], [4, 5, 6]]),
+        ("1 2 3\r4 5 6\r", [[1, 2, 3], [4, 5, 6]]),
         ("Export of 3 points\nfrom the big scanner\n1 2 3\n4 5 6\x1a", [[1, 2, 3], [4, 5, 6]]),
     ],
 )
@@ -208,7 +226,10 @@ def test_odd_spellings_are_read_right(text: str, points: list[list[float]], tmp_
     same(read(tmp_path, text).points, np.array(points))
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize(
+    "encoding",
+    ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-le", "utf-32-be"],
+)
 def test_every_encoding_gives_the_same_points(encoding: str, tmp_path: Path):
     text = ("# gemessen in München\n" + table(POINTS)) if "sig" in encoding else table(POINTS)
     same(read(tmp_path, text.encode(encoding)).points, POINTS)

@@ -14,6 +14,7 @@ from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
+from scanweld.geometry.pose import Pose
 from scanweld.io import (
     PoseSet,
     read_mesh,
@@ -117,6 +118,20 @@ def test_unit_of_the_glb(model: Path, capsys: pytest.CaptureFixture[str]):
     assert known == said != unknown
     assert scanweld("export", model, "--model", "glb", "--up", "-z", "-o", "turned") == 0
     assert Path("turned/model.glb").read_bytes() != known
+
+
+def test_names_that_not_every_system_can_have_are_said(
+    model: Path, capsys: pytest.CaptureFixture[str]
+):
+    names = ["Con", "scan", "Scan", "l" * 251, "l" * 252]
+    poses = {name: Pose.identity() for name in names}
+    write_poses(model / "poses.json", PoseSet(poses=poses, components=(tuple(names),)))
+    assert scanweld("export", model, "--poses", "cloudcompare", "-o", "out") == 3
+    told = capsys.readouterr().out
+    assert {path.stem for path in Path("out/cloudcompare").iterdir()} == set(names[:4])
+    assert "note: cloudcompare/Con.txt: Windows can have no files of such names" in told
+    assert re.search(r"note: cloudcompare/[sS]can.txt, cloudcompare/[sS]can.txt: for Windows", told)
+    assert f"left out of CloudCompare: {'l' * 252}: cannot be the name of a file" in told
 
 
 def test_other_components_and_unplaced_scans_are_said(

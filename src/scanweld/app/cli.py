@@ -170,6 +170,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _print_error(error)
         is_usage = isinstance(error, (KnowledgeError, BudgetError))
         sys.exit(ExitCode.USAGE if is_usage else ExitCode.ERROR)
+    except OSError as error:  # of names that are too long, or folders that cannot be entered
+        if error.filename is None:
+            raise
+        _print_error(InputError(f"{error.filename}: {error.strerror}; check the path"))
+        sys.exit(ExitCode.ERROR)
     finally:
         if arguments is None:
             gc.freeze()  # the process ends: to look through all its modules took 0.3 s

@@ -1,5 +1,7 @@
 """A model in the formats of other tools: its poses, its surface and its points."""
 
+import re
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +27,7 @@ from scanweld.io.pose_formats.records import printed
 from scanweld.io.read import part_names
 from scanweld.preparation.sensor import locate_sensor
 
+_NOT_ON_WINDOWS = re.compile(r"(^|/)(con|prn|aux|nul|(com|lpt)\d)(\.|$)|[<>:|?*\"\\]", re.I)
 _ABOUT_SHIFT = ("model.ply", "model.obj", "model.stl")
 """Files of the model in which one far off is about a local origin; a GLB moves it back itself."""
 
@@ -173,10 +176,26 @@ def _render(
     if wanted.points:
         contents |= _points_file(source, wanted.points, shift, refusals)
         notes += _grey_notes(source.scans.values())
+    notes += _name_notes(list(contents))
     about += [key for key in contents if key in _ABOUT_SHIFT or key == wanted.points]
     if shift is not None and about:
         notes.append(about_note(about, shift))
     return contents, notes
+
+
+def _name_notes(files: Sequence[str]) -> list[str]:
+    """What is said of files that other systems cannot have, or not beside each other."""
+    odd = [file for file in files if _NOT_ON_WINDOWS.search(file)]
+    lower = Counter(file.casefold() for file in files)
+    alike = [file for file in files if lower[file.casefold()] > 1]
+    return [
+        f"note: {', '.join(map(printed, names))}: {why}; rename the scans to copy them there"
+        for names, why in (
+            (odd, "Windows can have no files of such names"),
+            (alike, "for Windows and macOS, which tell no capitals, these are the same"),
+        )
+        if names
+    ]
 
 
 def _shift(source: _Source, wanted: Wanted) -> FloatArray | None:

@@ -14,7 +14,8 @@ def write_whole(path: Path, data: bytes) -> None:
     Raises:
         WriteError: If the file cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}.tmp")
+    # Not called after the file, whose name may be as long as names can be.
+    temporary = path.with_name(f".{os.getpid()}.{threading.get_ident()}.tmp")
     try:
         temporary.write_bytes(data)
         temporary.replace(path)

@@ -86,16 +86,17 @@ def _own_names(path: Path) -> list[str]:
 
 def _expand(each: Path | str) -> list[Path]:
     path = Path(each)
-    if path.is_dir():
+    if os.path.isdir(path):  # of a name that is too long the methods of Path raise
         try:
             return _scans_among(sorted(path.iterdir()), f"{path}: the folder")
         except OSError as error:
             raise ReadError(f"{path}: cannot be listed ({error.strerror}); check it") from error
-    if not path.exists() and glob.has_magic(str(each)):
+    exists = os.path.exists(path)
+    if not exists and glob.has_magic(str(each)):
         matches = [Path(match) for match in sorted(glob.glob(str(each)))]
         return _scans_among(matches, f"{each}: the pattern", suffix_of(path))
-    if not path.exists():
-        link = path.is_symlink()
+    if not exists:
+        link = os.path.islink(path)
         told = (
             "is a link that leads nowhere; copy the file"
             if link
@@ -127,7 +128,8 @@ def _scans_among(candidates: list[Path], where: str, named: str = "") -> list[Pa
         formats = ", ".join(known)
         raise InputError(f"{where} holds no scans{told}; scanweld looks for {formats} there")
     if found:
-        is_meant = any(foreign_kind(path) is not None for path in others)
+        texts = [path for path in others if suffix_of(path) in left_out]
+        is_meant = len(texts) > len(scans) or any(map(foreign_kind, others))
         logger.log(logging.WARNING if is_meant else logging.INFO, "%s also holds %s", where, found)
     return scans
 

@@ -20,7 +20,8 @@ from scanweld.io.matrices import rotation_of_quaternion
 
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-_PACKING = ("draco", "meshopt", "quantization")
+_LOOKS = ("materials", "texture", "lights", "xmp")
+"""Words in the names of extensions that change no point."""
 _LARGEST = 1e15
 """Coordinates that are larger have no digit left behind the point."""
 _HEAD, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
@@ -190,9 +191,12 @@ def parse_glb(path: Path, data: bytes) -> Gltf:
     gltf = Gltf(path, content, chunks.get(b"BIN\0", memoryview(b"")))
     if not isinstance(content, dict):
         raise gltf.broken("its description is no object")
-    needed = str(content.get("extensionsRequired", ""))[:80]
-    if any(word in needed for word in _PACKING):
-        raise gltf.broken(f"is packed by {needed}")
+    required = content.get("extensionsRequired", [])
+    if not isinstance(required, list):
+        raise gltf.broken("its extensionsRequired are no list")
+    needed = [str(name) for name in required if not any(word in str(name) for word in _LOOKS)]
+    if needed:
+        raise gltf.broken(f"needs {', '.join(needed)[:80]}, which is not read")
     return gltf
 
 

@@ -50,7 +50,9 @@ FOREIGN = (
     _foreign(".blend .max .3ds .ma .mb .c4d", "a scene of a 3D program", "export PLY or OBJ"),
     _foreign(".step .stp .iges .igs .sldprt .x_t", "CAD", "export STL or OBJ for simulate"),
     _foreign(".dxf .dwg .wrl .x3d", "a drawing or a scene", "export PLY or OBJ"),
-    _foreign(".zip .7z .rar .tar .tgz", "an archive", "unpack it"),
+    _foreign(".vtp .vtu .vts .vti .vtr", "XML of VTK", "save it as legacy VTK or PLY"),
+    _foreign(".splat .ksplat .spz .drc", "packed splats or meshes", "export PLY"),
+    _foreign(".zip .7z .rar .tar .tgz .bz2 .xz .zst", "an archive", "unpack it"),
 )
 """One line for each kind of file; docs/formats.md has the same table."""
 
@@ -100,6 +102,6 @@ def _words(kind: str, paths: Sequence[Path], only_named: frozenset[str]) -> str:
     if kind == "folders":
         return f"{files}/ (name it, too)" if one else f"{files} (name them, too)"
     if kind in only_named:
-        return f"{files} (name {'it' if one else 'them'} if that is a scan)"
+        return f"{files} ({'name it if that is a scan' if one else 'name them if those are scans'})"
     foreign = foreign_kind(paths[0])
     return files if foreign is None else f"{files} ({foreign.title}: {foreign.remedy})"

@@ -102,6 +102,8 @@ def _fields(path: Path, entries: dict[str, list[str]]) -> tuple[PcdField, ...]:
         raise ReadError(
             f"{path}: its header has not as many SIZE, TYPE and COUNT as FIELDS; export it anew"
         )
+    if any([name.lower() for name in names].count(axis) > 1 for axis in "xyz"):
+        raise ReadError(f"{path}: two of its FIELDS are called x, y or z; leave one of them")
     fields = []
     for name, size, kind, count in zip(names, sizes, types, counts, strict=True):
         if (

@@ -10,6 +10,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.io.atomic import write_whole
 from scanweld.io.matrices import pose_from_numbers
 from scanweld.io.names import natural_key
+from scanweld.io.text_encoding import plain_text
 
 FORMAT = 1
 CONVENTION = (
@@ -110,15 +111,18 @@ def _block(brackets: str, items: list[str]) -> str:
 
 
 def read_text(path: Path) -> str:
-    """The text of a UTF-8 file.
+    """The text of a file in UTF-8, or in UTF-16 or UTF-32.
 
     Raises:
         ReadError: If it cannot be read, or is no such text.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ReadError(f"{path}: cannot be read ({error}); check the path") from error
+        text = plain_text(path, path.read_bytes()).decode()
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    except UnicodeError as error:
+        raise ReadError(f"{path}: is no text in UTF-8; save it so") from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def load_json(path: Path, text: str) -> dict[str, Any]:

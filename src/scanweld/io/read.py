@@ -4,6 +4,7 @@ What overflows or is no number while bytes of any kind are read is not warned of
 refused, as all that is not finite.
 """
 
+import codecs
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -86,6 +87,7 @@ def _parts(path: Path) -> Sequence[Part]:
     if is_empty:
         raise ReadError(f"{path}: the file is empty; copy it again or leave it out")
     data = gunzip(path, data) if is_gzipped(path) else data
+    data = data.removeprefix(codecs.BOM_UTF8)
     try:
         found = form.read(path, data)
     except ReadError as error:

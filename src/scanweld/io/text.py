@@ -11,8 +11,10 @@ from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 
 _BLOCK = 2**22
-_NOT_A_NUMBER = re.compile(rb"[+-]?(nan(\(\w*\))?|1\.?#(qnan|snan|ind)\d*)", re.IGNORECASE)
-"""How some C libraries print what is not a number: nan(ind), -1.#IND00."""
+_NOT_A_NUMBER = re.compile(
+    rb"[+-]?(nan(\(\w*\))?|1\.?#(qnan|snan|ind|inf)\d*)|#?n/?a|null|none", re.IGNORECASE
+)
+"""How C libraries print what is not finite (nan(ind), -1.#IND00), and tables what is not there."""
 _FORTRAN = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 """Double precision as Fortran prints it: 1.5D+02."""
 _EXPONENT = bytes.maketrans(b"dD", b"ee")
@@ -59,10 +61,10 @@ def _numbers(text: bytes) -> FloatArray:
     values, begins = _simple_numbers(np.frombuffer(text, np.uint8))
     left = np.flatnonzero(np.isnan(values))
     if 2 * len(left) > len(values):
-        return np.fromiter(map(_plain_number, text.split()), dtype=np.float64)
+        return np.fromiter(map(plain_number, text.split()), dtype=np.float64)
     ends = np.append(begins[1:], len(text))[left]
     values[left] = [
-        _plain_number(text[begin:end])
+        plain_number(text[begin:end])
         for begin, end in zip(begins[left].tolist(), ends.tolist(), strict=True)
     ]
     return values
@@ -144,7 +146,7 @@ def _words_per_line(text: ByteArray) -> IntArray:  # pragma: no cover - compiled
 def is_number(word: bytes) -> bool:
     """Whether a word can be read as a number, by ``float`` and by ``parse_numbers``."""
     try:
-        _plain_number(word)
+        plain_number(word)
     except ValueError:
         return False
     return True
@@ -155,7 +157,12 @@ def is_any_number(word: bytes) -> bool:
     return is_number(word) or bool(_NOT_A_NUMBER.fullmatch(word) or _FORTRAN.fullmatch(word))
 
 
-def _plain_number(word: bytes) -> float:
+def plain_number(word: bytes) -> float:
+    """A word as a number.
+
+    Raises:
+        ValueError: If it is none.
+    """
     if b"_" in word:  # groups of digits to Python, and to nobody who writes scans
         raise ValueError("underscore")
     return float(word)
@@ -168,7 +175,7 @@ def _number(path: Path, word: bytes, line_number: int) -> float:
         return float(word.translate(_EXPONENT))
     if _NOT_A_NUMBER.fullmatch(word):
         return float("nan")
-    shown = word[:40].decode("ascii", errors="replace")
+    shown = word[:40].decode("utf-8", errors="replace")
     raise ReadError(
         f"{path}: line {line_number}: {shown!r} is not a number; correct it or export it anew"
     )

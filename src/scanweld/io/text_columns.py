@@ -9,8 +9,10 @@ import numpy as np
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.io.raw import RawScan, noted_bytes
-from scanweld.io.text_head import axis_name
+from scanweld.io.text import is_any_number
+from scanweld.io.text_head import axis_name, row_cells
 
+_FIRST_LINE = slice(0, 2**16)
 FIRST_ROWS = slice(0, 1000)
 """Most that is not so is not so here already, and the rest need not be looked at."""
 INDEX_NOTE = "first column left out: it counts the points"
@@ -57,7 +59,22 @@ def columns_by_name(path: Path, names: Sequence[str]) -> Columns:
 
 def is_known(name: str) -> bool:
     """Whether a column of this name is read."""
-    return axis_name(name) in "xyz" or any(name in c for cs in _NAMES.values() for c in cs)
+    return axis_name(name) in tuple("xyz") or any(name in c for cs in _NAMES.values() for c in cs)
+
+
+def without_words(text: bytes, names: Sequence[str]) -> bytes:
+    """The text with ``nan`` for the words of columns whose names are not read."""
+    first = text[_FIRST_LINE].splitlines()[:1]
+    cells = [cell for line in first for cell in row_cells(line.decode("latin-1"))]
+    other = [k for k, name in enumerate(names) if not is_known(name)]
+    if len(cells) != len(names) or all(is_any_number(cells[k].encode()) for k in other):
+        return text
+    rows = (row_cells(line.decode("latin-1")) for line in text.splitlines())
+    left = (
+        ["nan" if k in other and len(row) == len(names) else row[k] for k in range(len(row))]
+        for row in rows
+    )
+    return "\n".join(map(";".join, left)).encode("latin-1")
 
 
 def is_index(column: FloatArray) -> bool:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from scanweld.errors import ReadError
 
+UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -40,11 +41,12 @@ def plain_text(path: Path, data: bytes) -> bytes:
 
 
 def _without_mark(path: Path, begin: bytes) -> str:
-    """The encoding of a text with zero bytes: those of letters that need one byte of two."""
-    if all(begin[0::2]) and not any(begin[1::2]):
-        return "utf-16-le"
-    if all(begin[1::2]) and not any(begin[0::2]):
-        return "utf-16-be"
+    """The encoding of a text with zero bytes: those of letters that need one byte only."""
+    for size in (2, 4):
+        is_zero = [not any(begin[k::size]) for k in range(size)]
+        for order, k in (("le", 0), ("be", size - 1)):
+            if all(begin[k::size]) and sum(is_zero) == size - 1:
+                return f"utf-{8 * size}-{order}"
     raise ReadError(
         f"{path}: is binary, not text; give it the suffix of its format or export it as text"
     )

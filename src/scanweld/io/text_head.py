@@ -1,5 +1,6 @@
 """What stands above the numbers of a text: comments, column names, the number of points."""
 
+import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,10 +10,11 @@ from scanweld.errors import ReadError
 from scanweld.io.names import printable
 from scanweld.io.text import is_any_number
 
-_COMMENT = re.compile(rb"(^|\s)(#|//).*$", re.DOTALL)
-"""Not inside a word: some libraries print NaN as 1.#QNAN."""
+_COMMENT = re.compile(rb"(^|\s)(#(?!N/A)|//).*$", re.DOTALL)
+"""Not inside a word: some libraries print NaN as 1.#QNAN, and tables as #N/A."""
 _BETWEEN = re.compile(rb'[\s,;"]+')
 _MARK = re.compile(r"^\s*(#|//|%|!)+")
+_LETTER, _DIGIT = re.compile(rb"[A-Za-z]"), re.compile(rb"\d")
 _UNIT = re.compile(r" *[\[(][^\])]*[\])]")
 _HEAD = slice(0, 2**16)
 """Where the numbers must begin, in bytes."""
@@ -50,6 +52,7 @@ def split_head(path: Path, text: bytes) -> tuple[Head, bytes]:
     lines = text[_HEAD].splitlines(keepends=True)
     head: list[bytes] = []
     words: list[bytes] = []
+    names: tuple[str, ...] = ()
     count: int | None = None
     for line, following in zip(lines, [*lines[1:], b""], strict=False):
         filled = without_comment(line).strip()
@@ -61,8 +64,12 @@ def split_head(path: Path, text: bytes) -> tuple[Head, bytes]:
                 _check_words(path, words, len(cells))
                 break
             count = int(filled)
+        elif _is_row(_decoded(filled), names):
+            _check_words(path, words)
+            break
         elif cells:
             words.append(filled)
+        names = column_names(_decoded(line)) or names
         head.append(line)
     else:
         if all(column_names(_decoded(line)) for line in words):
@@ -83,19 +90,30 @@ def column_names(line: str) -> tuple[str, ...]:
     Units in brackets, quotes and the mark of a comment are left out. The line is cut at its
     semicolons, else at its tabs, else at its commas, else at its spaces.
     """
-    line = _UNIT.sub("", _MARK.sub("", line)).strip(" \r\n")
-    separator = next((mark for mark in ";\t," if mark in line), None)
-    cells = [cell.strip().strip("\"'").strip() for cell in line.split(separator)]
+    cells = row_cells(_UNIT.sub("", _MARK.sub("", line)))
     while cells and not cells[-1]:
         cells.pop()
-    names = tuple(re.sub(r"[^a-z0-9]", "", cell.casefold()) for cell in cells)
+    names = tuple(re.sub(r"[\W_]", "", cell.casefold()) for cell in cells)
     return names if {"x", "y", "z"} <= set(map(axis_name, names)) else ()
+
+
+def row_cells(line: str) -> list[str]:
+    """A line cut at its semicolons, else tabs, else commas, else spaces, but not inside quotes."""
+    line = line.strip(" \r\n")
+    mark = next((mark for mark in ";\t," if mark in line), None)
+    if mark is None:
+        return [cell.strip("\"'") for cell in line.split()]
+    try:
+        cells = next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])
+    except csv.Error:  # a line of 100 kB, for example
+        cells = line.split(mark)
+    return [cell.strip().strip("\"'").strip() for cell in cells]
 
 
 def axis_name(name: str) -> str:
     """x, y or z where a name means a coordinate; otherwise the name itself."""
     for axis, number in zip("xyz", "012", strict=True):
-        usual = (f"{axis}coord", f"{axis}coordinate", f"coord{axis}", f"pos{axis}")
+        usual = (f"{axis}coord", f"{axis}coordinate", f"coord{axis}", f"pos{axis}", f"{axis}pos")
         if name in (axis, *usual, f"position{axis}", f"points{number}"):
             return axis
     return name
@@ -116,12 +134,23 @@ def _are_counted_names(cells: Sequence[bytes], following: bytes) -> bool:
     return len(cells) > 2 and list(cells) == counted and b"." in following
 
 
-def _check_words(path: Path, words: Sequence[bytes], width: int) -> None:
+def _is_row(line: str, names: Sequence[str]) -> bool:
+    """Whether a line has a cell for each name, with numbers where a point's coordinates are."""
+    cells = row_cells(line)
+    axes = [k for k, name in enumerate(names) if axis_name(name) in tuple("xyz")]
+    words = [cells[k].replace(",", ".").encode() for k in axes if len(cells) == len(names)]
+    return bool(words) and all(map(is_any_number, words))
+
+
+def _check_words(path: Path, words: Sequence[bytes], width: int = 0) -> None:
     """That lines of words are no points with a slip of the pen, and no other format's head."""
+    if words and words[0].lower().startswith(b"ncols"):
+        raise ReadError(f"{path}: is a raster of heights (ESRI ASCII grid); export it as points")
     for line in words:
         cells = _cells(line)
         wrong = [cell for cell in cells if not is_any_number(cell)]
-        if len(cells) == width and wrong and 2 * len(wrong) < width:
+        are_numbers = 2 * len(wrong) < width or not _LETTER.search(line)
+        if len(cells) == width and wrong and are_numbers and _DIGIT.search(line):
             raise ReadError(
                 f"{path}: {_decoded(wrong[0])!r} in its first line of numbers is not a number; "
                 "correct it or export it anew"

@@ -16,6 +16,13 @@ _FRACTION = re.compile(rb",0\d")
 """No whole number begins so: it goes on from before the comma."""
 _SPACED = re.compile(rb",[ \t]")
 _TIGHT = re.compile(rb",[^\s,]")
+_GROUPED = re.compile(rb"(?<![\d.,])[1-9]\d{0,2}(?: \d{3})+(?!\d)")
+"""What may be one number whose thousands are set apart, or several."""
+_ZERO_GROUP = re.compile(rb"(?<![\d.,])[1-9]\d{0,2} 0\d\d(?!\d)")
+"""What can hardly be several: no number begins so."""
+_BETWEEN_DIGITS = re.compile(rb"\d +(?=[-+.\d])")
+_BEGIN = slice(0, 2**16)
+"""Where spaces in numbers show; if they come later, lines have different numbers of words."""
 _LINE = re.compile(rb"[^\r\n]*[^\s][^\r\n]*")
 _EMPTY_CELL = rb"((?<=%b)|(?<![^\r\n]))[ \t]*(?=%b)"
 _MOST_CERTAIN = 4
@@ -43,6 +50,8 @@ def with_spaces(
     """
     if b'"' in text:
         text = _without_quotes(text)
+    if _has_spaced_thousands(text[_BEGIN]):
+        raise _refused(path, text, "a space in its numbers may separate thousands", first_line)
     if b"," not in text:
         return (_filled(text, b";").translate(_SPACES) if b";" in text else text), False
     if b";" in text or (_INSIDE_WORD.search(text) and _has_spaced_words(text)):
@@ -64,6 +73,14 @@ def _without_quotes(text: bytes) -> bytes:
 
 def _has_spaced_words(text: bytes) -> bool:
     return (b" " in text or b"\t" in text) and bool(_BETWEEN_WORDS.search(text))
+
+
+def _has_spaced_thousands(text: bytes) -> bool:
+    """Whether spaces may stand inside numbers: in all places if something else is between them."""
+    grouped = sum(found[0].count(b" ") for found in _GROUPED.finditer(text))
+    if grouped and (b";" in text or b"\t" in text):
+        return grouped == sum(1 for _ in _BETWEEN_DIGITS.finditer(text))
+    return grouped > 0 and bool(_ZERO_GROUP.search(text))
 
 
 def _why_not_decimal(text: bytes) -> str:
@@ -90,8 +107,9 @@ def _why_not_separators(text: bytes, named: Collection[int]) -> str:
 
 
 def _refused(path: Path, text: bytes, reason: str, first_line: int) -> ReadError:
-    """The reason, with the first line that has a comma."""
-    at = next((line for line in _LINE.finditer(text) if b"," in line[0]), None)
+    """The reason, with the first line that has a comma, or a space."""
+    mark = b"," if b"," in text else b" "
+    at = next((line for line in _LINE.finditer(text) if mark in line[0]), None)
     shown = "" if at is None else at[0].strip()[:40].decode("ascii", errors="replace")
     number = first_line if at is None else first_line + len(text[: at.start()].splitlines())
     return ReadError(

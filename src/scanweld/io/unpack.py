@@ -8,6 +8,8 @@ from typing import Protocol
 
 from scanweld.errors import ReadError
 
+GZIP = b"\x1f\x8b"
+"""How a .gz begins."""
 SMALL = 64 * 2**20
 """Bytes up to which anything may unpack,"""
 MOST_EXPANSION = 100
@@ -24,6 +26,8 @@ def gunzip(path: Path, data: bytes) -> bytes:
     Raises:
         ReadError: If it is broken, or far larger than measured points can be.
     """
+    if not data.startswith(GZIP):
+        raise ReadError(f"{path}: is not packed; take .gz off its name")
     try:
         with gzip.GzipFile(fileobj=BytesIO(data)) as stream:
             return read_bounded(path, stream, len(data))

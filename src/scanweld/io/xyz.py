@@ -15,6 +15,7 @@ from scanweld.io.text_columns import (
     is_index,
     is_known,
     scan_of_columns,
+    without_words,
 )
 from scanweld.io.text_encoding import plain_text
 from scanweld.io.text_head import Head, column_names, split_head, unknown_names, without_comment
@@ -40,6 +41,7 @@ def read_xyz(path: Path, data: bytes) -> RawScan:
         text = b"\n".join(map(without_comment, text.splitlines()))
     first_line = len(head.lines) + 1
     named = [len(names) for names in head.names()]
+    text = without_words(text, next(head.names(), ()))
     text, has_commas = with_spaces(path, text, named, first_line)
     table = _table(path, text, first_line)
     if head.count is not None and head.count != len(table):

@@ -197,7 +197,15 @@ def as_named(inputs: Inputs, options: DepthOptions) -> Inputs | DepthImages:
 
     Raises:
         InputError: If a folder is a capture and holds other scans, too.
+        ReadError: If a folder cannot be listed.
     """
+    try:
+        return _as_named(inputs, options)
+    except OSError as error:
+        raise ReadError(f"{inputs[0]}: cannot be listed ({error.strerror}); check it") from error
+
+
+def _as_named(inputs: Inputs, options: DepthOptions) -> Inputs | DepthImages:
     images = DepthImages(inputs=inputs, options=options)
     if options != DepthOptions():
         return images

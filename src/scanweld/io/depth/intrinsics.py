@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from scanweld.errors import ReadError
+from scanweld.io.poses import read_text
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _NAMED = re.compile(rf"\b(fx|fy|cx|cy|width|height)\s*[=:]\s*({_NUMBER.pattern})")
@@ -66,11 +67,7 @@ def read_intrinsics(path: Path) -> Intrinsics:
     Raises:
         ReadError: If it cannot be read, has no such form, or a lens that cannot be undone.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or "no text"
-        raise ReadError(f"{path}: cannot be read ({reason}); --intrinsics takes {FORMS}") from error
+    text = read_text(path)
     try:
         return _intrinsics(text)
     except (

@@ -29,7 +29,8 @@ def read_pixels(path: Path) -> NDArray:
     values = read(path)
     if values.ndim == 3 and 1 in (values.shape[0], values.shape[2]):
         values = values.reshape([size for size in values.shape if size > 1] or [1])
-    if values.ndim != 2 or not values.size or values.dtype.kind not in "uif":
+    is_deep = values.dtype.kind in "uif" and values.dtype.itemsize > 1
+    if values.ndim != 2 or not values.size or not is_deep:
         raise ReadError(
             f"{path}: holds {values.dtype} of shape {values.shape}, not one depth a pixel; name "
             "the depth images"
@@ -103,14 +104,17 @@ def _image(path: Path, *, depths: bool = True) -> NDArray:
                         f"{path}: a picture ({image.mode}, 8 bits a pixel), not depths; name the "
                         "16-bit depth images"
                     )
+                if depths and (count := getattr(image, "n_frames", 1)) > 1:
+                    raise ReadError(f"{path}: holds {count} images; save each in its own file")
                 with_colors = image.mode in ("P", "RGBA", "LA", "CMYK", "YCbCr")  # opacity is none
                 return np.asarray(image.convert("RGB") if with_colors else image)
     except ReadError:
         raise
     except Exception as error:  # whatever Pillow's decoders throw at a damaged file
+        remedy = "save it as 16-bit PNG" if depths else "leave it out"
         raise ReadError(
             f"{path}: cannot be read as an image ({' '.join(str(error).split())[:100]}); copy it "
-            "again or leave it out"
+            f"again or {remedy}"
         ) from error
 
 

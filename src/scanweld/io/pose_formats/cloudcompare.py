@@ -24,6 +24,8 @@ from scanweld.io.poses import read_text
 
 TITLE = "CloudCompare"
 FOLDER = "cloudcompare"
+_LONGEST = 255
+"""Bytes that the name of a file may have in the usual file systems."""
 
 
 def recognise(text: str) -> bool:
@@ -67,7 +69,8 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
     refuse_characters(scans, [scan.name for scan in scans], "", TITLE)
     for scan in scans:
         path = PurePosixPath(scan.name)
-        if path.is_absolute() or ".." in path.parts or path.name in ("", "."):
+        is_long = any(len(f"{part}.txt".encode()) > _LONGEST for part in path.parts)
+        if path.is_absolute() or ".." in path.parts or path.name in ("", ".") or is_long:
             raise WriteError(f"{printed(scan.name)}: cannot be the name of a file; rename it")
     return {
         f"{FOLDER}/{scan.name}.txt": "\n".join(matrix_rows(scan.world_from_scan)) + "\n"

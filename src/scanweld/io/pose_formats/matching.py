@@ -5,7 +5,7 @@ from pathlib import Path, PurePosixPath
 
 from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
-from scanweld.io.names import natural_key
+from scanweld.io.names import natural_key, stem_of
 from scanweld.io.pose_formats.records import PoseEntries, printed
 
 
@@ -79,7 +79,7 @@ def _scan_of(label: str, names: Sequence[str], are_paths: bool) -> str | None:
     if label in names or not are_paths:
         return label if label in names else None
     path = PurePosixPath(label.replace("\\", "/"))
-    parts = (*path.parts[:-1], path.stem)
+    parts = (*path.parts[:-1], stem_of(path))
     matches = [name for name in names if _is_end(parts, PurePosixPath(name).parts)]
     return matches[0] if len(matches) == 1 else None
 

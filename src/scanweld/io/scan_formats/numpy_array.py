@@ -49,7 +49,8 @@ def read_numpy(path: Path, data: bytes) -> RawScan:
             f"{path}: holds {', '.join(sorted(arrays)) or 'nothing'}, but no points; save them "
             "under that name"
         )
-    left_out = sorted(set(arrays) - {name for names in _KEYS.values() for name in names})
+    used = [next((n for n in names if n in arrays), "") for names in _KEYS.values()]
+    left_out = sorted(set(arrays).difference(used))
     told = (f"arrays left out: {', '.join(left_out)}",) if left_out and len(arrays) > 1 else ()
     return _raw_scan(path, found, told)
 

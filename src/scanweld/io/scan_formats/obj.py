@@ -8,6 +8,7 @@ from scanweld.errors import ReadError
 from scanweld.io.mesh_lines import broken_line, fan_faces, filled_lines
 from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
+from scanweld.io.text import plain_number
 
 _NO_INDEX = 2**31
 """No file has so many vertices."""
@@ -25,7 +26,7 @@ def read_obj(path: Path, data: bytes) -> RawScan:
     for number, words in filled_lines(data.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")):
         try:
             if words[0] == b"v":
-                vertices.append([float(word) for word in words[1:]])
+                vertices.append([plain_number(word) for word in words[1:]])
             elif words[0] == b"f":
                 corners += (_obj_index(word, len(vertices)) for word in words[1:])
                 counts.append(len(words) - 1)
@@ -35,16 +36,17 @@ def read_obj(path: Path, data: bytes) -> RawScan:
     if not sizes:
         raise ReadError(f"{path}: holds no vertices; export the scan as a mesh or as points")
     faces = fan_faces(counts, corners)
+    no_normals = ("normals left out",) if b"\nvn" in data else ()
     if sizes in ([3, 6], [4, 7]):
         note = "colours on some of its vertices only, so they were left out"
         points = np.array([vertex[:3] for vertex in vertices])
-        return RawScan(points=points, faces=faces, notes=(note,))
+        return RawScan(points=points, faces=faces, notes=(note, *no_normals))
     if len(sizes) > 1 or sizes[0] not in (3, 4, 6, 7):
         raise ReadError(f"{path}: its vertices have {sizes} numbers, not all 3; export it anew")
     table = np.array(vertices)
     found = table[:, -3:] if sizes[0] >= 6 else None
     colors, notes = noted_bytes("colours", found, "f8")
-    return RawScan(points=table[:, :3], faces=faces, colors=colors, notes=notes)
+    return RawScan(points=table[:, :3], faces=faces, colors=colors, notes=(*notes, *no_normals))
 
 
 def _obj_index(word: bytes, num_vertices: int) -> int:

@@ -10,7 +10,7 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.io.mesh_lines import broken_line, fan_faces, filled_lines
 from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
-from scanweld.io.text import is_number
+from scanweld.io.text import is_number, plain_number
 
 _COUNT = re.compile(rb"[0-9]{1,15}")
 _OFF_MAGIC = re.compile(rb"(C?)(N?)OFF\b", re.IGNORECASE)
@@ -59,7 +59,7 @@ def _off_vertices(path: Path, rows: list[tuple[int, list[bytes]]]) -> FloatArray
         if len(words) != width or width < 3:
             raise broken_line(path, number, words)
     try:
-        return np.array([[float(word) for word in words] for _, words in rows])
+        return np.array([[plain_number(word) for word in words] for _, words in rows])
     except ValueError:
         number, words = next(row for row in rows if not all(map(is_number, row[1])))
         raise broken_line(path, number, words) from None

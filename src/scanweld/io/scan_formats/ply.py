@@ -27,9 +27,11 @@ _COLORS = (
     ("diffuse_red", "diffuse_green", "diffuse_blue"),
     ("r", "g", "b"),
 )
+_NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
 _OF_MODELS = ("confidence", "support", "stdev", "filled", "scan")
-_KNOWN = {*"xyz", "nx", "ny", "nz", "intensity", "alpha", *_OF_MODELS}.union(*_COLORS)
+_KNOWN = {*"xyz", "intensity", "alpha", *_OF_MODELS}.union(*_NORMALS, *_COLORS)
 """Properties of a vertex that are read, or need no word."""
+_ELEMENTS = ("vertex", "face", "range_grid", "camera")
 _LARGEST_INDEX = 2**53
 """Above this a double, as which the numbers of ASCII files are read, is not exact."""
 _SHORT_NUMBER = re.compile(r"[0-9]{1,9}")
@@ -71,13 +73,18 @@ def read_ply(path: Path, data: bytes) -> RawScan:
     intensity, no_shades = _bytes("intensities", element, vertex, ("intensity",))
     colors, no_colors = _colors(element, vertex)
     ignored = [name for name in vertex if name not in _KNOWN]
-    told = (f"properties ignored: {', '.join(ignored)[:200]}",) if ignored else ()
+    others = [element.name for element in header.elements if element.name not in _ELEMENTS]
+    told = tuple(
+        f"{what} ignored: {', '.join(names)[:200]}"
+        for what, names in (("properties", ignored), ("elements", others))
+        if names
+    )
     notes += (*no_shades, *no_colors, *told)
     return RawScan(
         points=points,
         grid=grid,
         faces=_faces(header, tables),
-        normals=_stack(vertex, ("nx", "ny", "nz")),
+        normals=next((n for names in _NORMALS if (n := _stack(vertex, names)) is not None), None),
         colors=colors,
         intensity=None if intensity is None else intensity[:, 0],
         confidence=_column(vertex, "confidence"),
@@ -144,7 +151,7 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
     """The range grid (rows, columns) of vertex indices, -1 where a cell is empty."""
     element = header.element("range_grid")
     if element is None or element.count == 0:
-        return _grid_of_all(header), ()
+        return _grid_of_all(header)
     cells = _index_list(header.path, tables["range_grid"])
     if cells is None:
         raise ReadError(f"{header.path}: its range_grid has no list vertex_indices; export it anew")
@@ -167,15 +174,16 @@ def _grid(header: PlyHeader, tables: dict[str, Columns]) -> tuple[IntArray | Non
     return grid, ()
 
 
-def _grid_of_all(header: PlyHeader) -> IntArray | None:
+def _grid_of_all(header: PlyHeader) -> tuple[IntArray | None, tuple[str, ...]]:
     """The grid of vertices that stand in its order, NaN where nothing was seen, as PCL writes."""
     shape = [header.info.get(key, "") for key in ("num_rows", "num_cols")]
     vertex = header.element("vertex")
     if vertex is None or not all(_SHORT_NUMBER.fullmatch(text) for text in shape):
-        return None
+        return None, ()
     rows, columns = (int(text) for text in shape)
-    fits = rows * columns == vertex.count and min(rows, columns) > 1
-    return full_grid(rows, columns) if fits else None
+    if rows * columns != vertex.count:
+        return None, (f"its num_cols x num_rows, {columns} x {rows}, are not its points: ignored",)
+    return (full_grid(rows, columns) if min(rows, columns) > 1 else None), ()
 
 
 def _faces(header: PlyHeader, tables: dict[str, Columns]) -> IntArray | None:

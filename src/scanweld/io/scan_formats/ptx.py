@@ -30,6 +30,8 @@ def read_ptx(path: Path, data: bytes) -> list[Part]:
     Raises:
         ReadError: If a head is broken, or the file ends too early.
     """
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
     text = np.frombuffer(data, np.uint8)
     parts = []
     at, line = _skip_blank(text, 0, 1)

@@ -15,6 +15,7 @@ from scanweld.io.text import is_number
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
 _STL_HEAD = 84
+_ENDS = (b"endsolid", b"ENDSOLID")
 _ZERO = np.float32(0)
 """Added to minus zero it gives zero, whose bits are others."""
 
@@ -28,11 +29,14 @@ def read_stl(path: Path, data: bytes) -> RawScan:
         ReadError: If it is neither kind of STL, or truncated.
     """
     num_facets = int.from_bytes(data[80:_STL_HEAD], "little")
-    if len(data) == _STL_HEAD + _STL_FACET.itemsize * num_facets:
+    size = _STL_HEAD + _STL_FACET.itemsize * num_facets
+    if len(data) == size:
         facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEAD)
         corners = (facets["corners"] + _ZERO).reshape(-1, 3)
-    elif data.lstrip()[:5].lower() == b"solid" and b"endsolid" in data:
+    elif data.lstrip()[:5].lower() == b"solid" and any(word in data for word in _ENDS):
         corners = _ascii_corners(path, data) + _ZERO
+    elif num_facets and 0 < len(data) - size < _STL_HEAD:
+        raise ReadError(f"{path}: goes on behind its {num_facets} triangles; export it anew")
     else:
         raise ReadError(f"{path}: not an STL file, or a truncated one; copy it again")
     if len(corners) % 3:

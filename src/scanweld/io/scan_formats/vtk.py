@@ -33,7 +33,7 @@ def read_vtk(path: Path, data: bytes) -> RawScan:
     body = VtkBody(path, data, 0, is_binary=False)
     body.rest_of_line()
     body.rest_of_line()  # the title, which may be blank
-    encoding, dataset = body.line(), body.line()
+    encoding, dataset = ([word.upper() for word in body.line()] for _ in range(2))
     if encoding not in (["ASCII"], ["BINARY"]):
         raise ReadError(f"{path}: is neither ASCII nor BINARY; save it anew")
     if dataset[:1] != ["DATASET"] or dataset[1:] not in ([name] for name in _DATASETS):
@@ -55,23 +55,24 @@ class _Sections:
         self.dimensions: list[int] = []
         self.num_values = 0
         self.is_of_points = False
+        self.notes: tuple[str, ...] = ()
 
     def read(self) -> RawScan:
         """All of them, up to the first that is not known."""
         known: dict[str, Callable[[list[str]], None]] = {
             **{"DIMENSIONS": self._dimensions, "POINTS": self._points, "CELLS": self._cells},
             **{"POLYGONS": self._polygons, "CELL_TYPES": self._cell_types},
-            **dict.fromkeys(("VERTICES", "LINES", "TRIANGLE_STRIPS"), self._other_cells),
+            **dict.fromkeys(("VERTICES", "LINES"), self._other_cells),
+            **{"TRIANGLE_STRIPS": self._strips},
             **{"POINT_DATA": self._point_data, "CELL_DATA": self._cell_data},
             **{"METADATA": self._metadata, "FIELD": self._field, "SCALARS": self._scalars},
             **{"NORMALS": self._normals, "VECTORS": self._vectors},
             **{"COLOR_SCALARS": self._color_scalars, "LOOKUP_TABLE": self._lookup_table},
         }
-        notes = ()
         while words := self.body.line():
             section = known.get(words[0].upper())
             if section is None:
-                notes = (f"left out from {words[0][:40]} on",)
+                self.notes += (f"left out from {words[0][:40]} on",)
                 break
             try:
                 section(words[1:])
@@ -85,7 +86,7 @@ class _Sections:
             colors=self.colors,
             faces=self.faces,
             grid=self._grid(len(self.points)),
-            notes=notes,
+            notes=self.notes,
         )
 
     def _grid(self, num_points: int) -> IntArray | None:
@@ -111,6 +112,10 @@ class _Sections:
 
     def _other_cells(self, told: list[str]) -> None:
         self._cells(told)
+
+    def _strips(self, told: list[str]) -> None:
+        self._other_cells(told)
+        self.notes += ("triangle strips left out",)
 
     def _cell_types(self, told: list[str]) -> None:
         types = self.body.values(self.body.number(told[0]), "int")

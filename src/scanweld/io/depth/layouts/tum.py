@@ -65,7 +65,7 @@ def _rows(path: Path, count: int) -> list[list[str]]:
     """The words of each line of a list, the first of which is a time; none if there is no file."""
     rows = []
     for k, line in enumerate(read_text(path).splitlines() if path.is_file() else (), start=1):
-        words = line.split("#")[0].split()
+        words = line.split("#")[0].replace("\\", "/").split()
         if not words:
             continue
         if len(words) != count or not are_numbers(words[:1]):
