@@ -5,8 +5,6 @@ from pathlib import Path
 from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
 from scanweld.io.text import is_number
 
-BEGIN = 200
-"""Bytes that tell."""
 _OTHERS = (
     ((b"\x1f\x8b",), "is packed by gzip", "add .gz to its name"),
     ((b"pk\3\4",), "is a ZIP archive", "unpack it"),

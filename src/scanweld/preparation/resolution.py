@@ -3,9 +3,7 @@
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
-
-NUM_QUERIES = 2000
-"""Points whose nearest neighbour is looked up; the median of so many is good to 2 %."""
+from scanweld.geometry.sampling import NUM_FEW
 
 
 def point_spacing(points: FloatArray) -> float:
@@ -15,7 +13,7 @@ def point_spacing(points: FloatArray) -> float:
     """
     from scipy.spatial import KDTree
 
-    queries = points[:: max(1, len(points) // NUM_QUERIES)]
+    queries = points[:: max(1, len(points) // NUM_FEW)]
     distances = KDTree(points).query(queries, k=min(4, len(points)))[0].reshape(len(queries), -1)
     nearest = np.where(distances > 0, distances, np.inf).min(axis=1)
     nearest = nearest[np.isfinite(nearest)]
