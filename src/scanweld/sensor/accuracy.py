@@ -12,7 +12,7 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.buckets import cells_of
-from scanweld.geometry.gauss_newton import jacobian, lever_arm
+from scanweld.geometry.gauss_newton import NEARLY_ALL_SIGMAS, jacobian, lever_arm
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
@@ -20,9 +20,6 @@ from scanweld.refinement.refine import match_surfaces
 from scanweld.refinement.surface_terms import SurfaceSource
 from scanweld.sensor.learn import PATCH_DIAMETERS
 from scanweld.sensor.model import SensorModel
-
-MATCH_SIGMAS = 3.0
-"""Farthest match, in standard deviations of the distance between surfaces."""
 
 
 def pose_deviations(
@@ -45,7 +42,7 @@ def pose_deviations(
     """
     diameter = sensor.diameter
     order = sorted(world_from_sensor)
-    radius = max(MATCH_SIGMAS * sensor.sigma, 0.006 * diameter)
+    radius = max(NEARLY_ALL_SIGMAS * sensor.sigma, 0.006 * diameter)
     found = match_surfaces(sources, world_from_sensor, pairs, radius, workers)
     middles = {k: world_from_sensor[k].apply(_middle(sources[k])) for k in order}
     covariance = _covariance(found, order, world_from_sensor, middles, sensor)

@@ -14,10 +14,10 @@ from scanweld.io.depth.layouts.records import (
     Layout,
     Shot,
     fitted,
-    from_opengl,
     images_in,
     pose_or_none,
 )
+from scanweld.io.matrices import from_opengl
 from scanweld.io.poses import load_json, read_text
 
 _CAMERAS = {"corrected_cameras": "corrected_images", "cameras": "images"}
