@@ -15,7 +15,6 @@ from benchmarks.results import DATA
 COMMANDS = {
     "run": ("sets", "--seeds 3"),
     "pairs": ("pairs", "--seeds 3 --keypoints heat even mixed --plot docs/pairs.png"),
-    "keypoints": ("keypoints", ""),
     "model": ("model", ""),
     "depth": ("depth", ""),
 }

@@ -23,8 +23,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.blocks import rendered
+from benchmarks.captures import depth_frames, kept_records, parser_of
 from benchmarks.kept import warn_of_old_calibration
-from benchmarks.results import Json, commit, read_results, write_results
+from benchmarks.results import Json, commit, write_results
 from benchmarks.sets import data_folder
 from benchmarks.virtual.bodies import make_body
 from scanweld.cut import mask_of
@@ -41,7 +42,7 @@ from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import PoseSet, read_poses
-from scanweld.io.depth.capture import DepthImages, DepthOptions
+from scanweld.io.depth.capture import DepthImages
 from scanweld.io.depth.pixels import read_mask
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline.run import run
@@ -82,18 +83,11 @@ class Case:
 
 def main() -> int:
     """Measure; print the tables."""
-    parser = argparse.ArgumentParser(description="Depth cameras.")
-    add = parser.add_argument
     kinds = {"dog": dog, "simulated": simulated, "bust": bust, "shelf": shelf}
-    add("--kinds", nargs="+", choices=list(kinds), default=list(kinds))
-    add("--quick", action="store_true", help="one small set that needs no data")
-    add("--data", type=Path, help="folder of the data")
-    add("--workers", type=int, default=2)
-    add("--out", type=Path, help="JSON file of all records")
-    options = parser.parse_args()
+    options = parser_of("Depth cameras.", "kind", kinds).parse_args()
     warn_of_old_calibration()
     chosen = ["simulated"] if options.quick else options.kinds
-    records = [r for r in kept_records(options.out) if r["kind"] not in chosen]
+    records = kept_records(options.out, "kind", chosen)
     for make in cases(options, kinds):
         case = make()
         records.append(measured(case, options.workers))
@@ -104,11 +98,6 @@ def main() -> int:
             write_results(options.out, records)
     print(rendered("depth", **by_kind(records)), end="")
     return 0
-
-
-def kept_records(path: Path | None) -> list[Json]:
-    """What was measured before: a command may measure some of the kinds anew."""
-    return read_results(path)["records"] if path is not None and path.is_file() else []
 
 
 def cases(
@@ -226,7 +215,7 @@ def dog(data: Path) -> Iterator[Callable[[], Case]]:
 
 
 def _dog(folder: Path, masks: Path | None) -> Case:
-    scans = frames(folder, masks=masks)
+    scans = [frame.read() for frame in depth_frames(folder, masks=masks)]
     found = {scan.name: read_mask(folder / "mask" / f"{scan.name}.png") for scan in scans}
     seen = {scan.name: scan.grid >= 0 for scan in scans if scan.grid is not None}
     truth = read_poses(folder / "poses.json").poses
@@ -274,9 +263,9 @@ def _bust(folder: Path, count: int | None) -> Case:
     sound = {name: pose for name, pose in truth.items() if name not in FALSE_SURFACE}
     names = list(sound)
     if count is not None:
-        chosen = np.linspace(0, len(names) - 1, count).round().astype(int)
-        names = [names[k] for k in chosen]
-    scans = frames(folder, names=names if count is not None else None)
+        names = [names[k] for k in np.linspace(0, len(names) - 1, count).round().astype(int)]
+    chosen = depth_frames(folder, names=None if count is None else names)
+    scans = [frame.read() for frame in chosen]
     return Case(
         subject=f"bust, {len(scans)} of {len(truth)} frames",
         kind="bust",
@@ -302,17 +291,6 @@ def _shelf(folder: Path) -> Case:
         limits=SHELF_LIMITS,
         diameter=METRE,
     )
-
-
-def frames(
-    folder: Path, names: Sequence[str] | None = None, masks: Path | None = None
-) -> list[RangeScan]:
-    """The depth images of a folder of the data as scans, all or those of some names."""
-    inputs = [folder / "depth"]
-    if names is not None:
-        inputs = [folder / "depth" / f"{name}.png" for name in names]
-    options = DepthOptions(intrinsics=folder / "intrinsics.json", masks=masks)
-    return [file.read() for file in DepthImages(inputs=inputs, options=options).collect()]
 
 
 if __name__ == "__main__":

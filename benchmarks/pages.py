@@ -14,7 +14,6 @@ from benchmarks import (
     blocks,
     depth,
     fuzz,
-    keypoints,
     model,
     pairs,
     reading,
@@ -34,7 +33,6 @@ TABLE_OF_FORMATS = "scan-formats"
 BLOCKS: dict[str, tuple[str, Callable[[Sequence[Json]], Json]]] = {
     **dict.fromkeys(("sets", "sets-in-words"), ("sets", run.over_seeds)),
     **dict.fromkeys(("pairs", "pairs-in-words"), ("pairs", pairs.over_pairs)),
-    "keypoints": ("keypoints", keypoints.over_views),
     **dict.fromkeys(("model", "model-rivals", "model-many"), ("model", model.by_kind)),
     "fuzz": ("fuzz", fuzz.by_format),
     "reading": ("reading", reading.over_files),

@@ -27,7 +27,7 @@ from benchmarks.scores import Stated
 from benchmarks.sets import OBJECTS, PairSet, data_folder, made_pairs, moved_scans, real_pairs
 from benchmarks.study.plots import save, subplots
 from scanweld.config import Config, PairsConfig
-from scanweld.evaluation.metrics import MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT, object_diameter
+from scanweld.evaluation.metrics import RIGHT, object_diameter
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import describe
@@ -119,7 +119,7 @@ def _error(i: PreparedScan, j: PreparedScan, i_from_j: Pose, true: Pose) -> tupl
 
 def _told(result: PairResult, errors: Sequence[tuple[float, float]]) -> Json:
     """What a pair's result says, and the errors of its answers in degrees and percent."""
-    limits, best = (MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT), result.best
+    limits, best = RIGHT, result.best
     right = [k for k, (r, t) in enumerate(errors, 1) if r <= limits[0] and t <= limits[1]]
     rotation, translation = errors[0] if errors else (None, None)
     return {

@@ -21,8 +21,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from benchmarks.captures import depth_frames, kept_records, parser_of
 from benchmarks.kept import warn_of_old_calibration
-from benchmarks.results import Json, read_results, write_results
+from benchmarks.results import Json, write_results
 from benchmarks.sets import data_folder
 from benchmarks.surface.surface_distances import surface_distances
 from benchmarks.virtual.bodies import make_body
@@ -63,24 +64,17 @@ DISTANCE, SIZE = 0.5, 0.2
 
 def main() -> int:
     """Measure; print a line for each record."""
-    parser = argparse.ArgumentParser(description="Video of depth cameras.")
-    add = parser.add_argument
     parts = {"kitchen": kitchen, "long": long, "noise": noise, "objects": objects}
-    add("--parts", nargs="+", choices=list(parts), default=list(parts))
-    add("--quick", action="store_true", help="one short simulated way, without the data")
+    parser = parser_of("Video of depth cameras.", "part", parts)
+    add = parser.add_argument
     add("--frames", type=int, default=1000, help="of the long video")
     add("--objects", type=int, default=5, help="how many of them")
     add("--pixels", type=int, default=320, help="width of the objects' frames")
     add("--turn", type=float, default=TURN_DEG, help="how far around them, in degrees")
-    add("--data", type=Path, help="folder of the data")
-    add("--workers", type=int, default=2)
-    add("--out", type=Path, help="JSON file of all records")
     options = parser.parse_args()
     warn_of_old_calibration()
     wanted = ["noise"] if options.quick else options.parts
-    records: list[Json] = []
-    if options.out and options.out.is_file():  # parts may be measured one at a time
-        records = [r for r in read_results(options.out)["records"] if r["part"] not in wanted]
+    records = kept_records(options.out, "part", wanted)
     for part in wanted:
         for record in parts[part](options):
             records.append({"part": part, **record})
@@ -100,7 +94,7 @@ def kitchen(options: argparse.Namespace) -> Iterator[Json]:
     """Drift against the given poses, and noise by second differences, of real frames."""
     folder = data_folder(options.data) / "depth" / "video-kinect-kitchen"
     truth = read_poses(folder / "poses.json").poses
-    frames = _frames_of(folder)
+    frames = depth_frames(folder)
     depth = {frame.name: depth_image(frame.read()) for frame in frames}
     found, log, seconds = _tracked(
         [VideoFrame(name=name, depth=image) for name, image in depth.items()], _camera(frames)
@@ -265,11 +259,6 @@ def _scan(keyframe: Keyframe, camera: Camera) -> RangeScan:
         scan_from_sensor=Pose.identity(),
         viewpoint=Viewpoint.GIVEN,
     )
-
-
-def _frames_of(folder: Path) -> tuple[Frame, ...]:
-    options = DepthOptions(intrinsics=folder / "intrinsics.json")
-    return DepthImages(inputs=[folder / "depth"], options=options).collect()
 
 
 def _camera(frames: Sequence[Frame]) -> Camera:

@@ -4,7 +4,7 @@ import numpy as np
 
 from scanweld.evaluation.primitives import sphere
 from scanweld.fusion.finish import close_pinholes, decimated, smoothed, split_fans
-from scanweld.geometry.mesh import IN_CONFLICT, border_edges, face_normals, opposite_edges
+from scanweld.geometry.mesh import NoEdge, border_edges, face_normals, opposite_edges
 from tests.meshes import is_closed
 
 
@@ -48,9 +48,9 @@ def test_an_edge_knows_the_other_face_or_why_there_is_none():
     faces = np.array([[0, 1, 2], [1, 0, 3]])
     np.testing.assert_array_equal(opposite_edges(faces, 4), [3, -1, -1, 0, -1, -1])
     fin = np.concatenate([faces, [[0, 1, 4]]])
-    np.testing.assert_array_equal(opposite_edges(fin, 5)[[0, 3, 6]], [IN_CONFLICT] * 3)
+    np.testing.assert_array_equal(opposite_edges(fin, 5)[[0, 3, 6]], [NoEdge.IN_CONFLICT] * 3)
     turned = np.array([[0, 1, 2], [0, 1, 3]])
-    np.testing.assert_array_equal(opposite_edges(turned, 4)[[0, 3]], [IN_CONFLICT] * 2)
+    np.testing.assert_array_equal(opposite_edges(turned, 4)[[0, 3]], [NoEdge.IN_CONFLICT] * 2)
     assert len(border_edges(turned, 4)[0]) == 4
 
 

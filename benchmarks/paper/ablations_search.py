@@ -9,17 +9,14 @@ from benchmarks.sets import overlaps_of
 from benchmarks.study.records import Limit
 from benchmarks.study.study import Record, Result, Unit
 from scanweld.config import Config, PairsConfig
-from scanweld.evaluation.metrics import (
-    MAX_ROTATION_DEG,
-    MAX_TRANSLATION_PERCENT,
-)
+from scanweld.evaluation import metrics
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, FREE_WEIGHT, VIOLATION_WEIGHT
 from scanweld.heat.features import describe
 
 REAL = ("stanford-bunny", "stanford-dragon")
 THIN_OVERLAPS = (0.03, 0.25)
 MIN_ANCHORS = 8
-RIGHT = Limit(deg=MAX_ROTATION_DEG, percent=MAX_TRANSLATION_PERCENT)
+RIGHT = Limit(deg=metrics.RIGHT.rotation_deg, percent=metrics.RIGHT.translation_percent)
 
 ANCHORS = {
     "PA-HKS keypoints alone": "heat",

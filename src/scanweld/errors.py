@@ -1,6 +1,10 @@
 """What scanweld raises, and with what a command leaves: bad input and bad use, no failed pair."""
 
+from collections.abc import Sequence
 from enum import IntEnum
+
+MAX_NAMED = 5
+"""Things that a sentence names, at most."""
 
 
 class ExitCode(IntEnum):
@@ -39,3 +43,9 @@ class BudgetError(ScanweldError):
 
 class InputError(ScanweldError):
     """Too little, or nothing, to work on."""
+
+
+def some_of(words: Sequence[str]) -> str:
+    """The first few of what a message names, and how many more there are."""
+    left = len(words) - MAX_NAMED
+    return ", ".join(words[:MAX_NAMED]) + (f" and {left} more" if left > 0 else "")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import depth, kept, keypoints, model, pairs, run, trust
+from benchmarks import depth, kept, model, pairs, run, trust
 from benchmarks.blocks import rendered
 from benchmarks.calibration import __main__ as calibration
 from benchmarks.compare import difference
@@ -63,13 +63,6 @@ def test_depth_runs_quickly(command: Command, tmp_path: Path, capsys: pytest.Cap
     (record,) = read_results(out)["records"]
     assert record["scans"] == 3 and record["good_and_wrong"] == 0 and record["iou"][0] > 0.93
     assert "| thing 0 | 3 |" in capsys.readouterr().out
-
-
-def test_keypoints_run_quickly(command: Command, capsys: pytest.CaptureFixture[str]):
-    command(keypoints, "--quick")
-    row = capsys.readouterr().out.splitlines()[-1].split(" | ")
-    repeated, chance = float(row[3]), float(row[4])
-    assert row[0] == "| creature" and repeated > 1.5 * chance > 0
 
 
 def test_models_run_quickly(command: Command, tmp_path: Path, capfd: pytest.CaptureFixture[str]):

@@ -183,12 +183,16 @@ def test_rescoring_ranks_kept_poses_anew():
     assert rescored(none, "as it stands")[0] == [False]
 
 
-def test_keypoints_of_the_same_view_repeat_and_match_themselves():
+def test_keypoints_of_the_same_view_repeat_and_match_themselves_those_of_another_beat_chance():
     view = virtual_scan("creature", 135.0)
     found = describe(view.scan, HeatConfig())
     right, asked, by_chance = repeated(known_pair(view, view), (found, found))
     assert asked == 2 * len(found) > 0
     assert right == asked > by_chance > 0
+    other = virtual_scan("creature", 165.0)
+    both = known_pair(view, other)
+    right, _, by_chance = repeated(both, (found, describe(other.scan, HeatConfig())))
+    assert right > 1.2 * by_chance > 0
     right, asked, by_chance = right_matches(Pose.identity(), found, found, 0.06 * view.diameter)
     assert right == asked == len(found)
     assert 0 < by_chance < asked

@@ -10,12 +10,11 @@ from scanweld.cut import cut_out
 from scanweld.cut.frames import depth_image
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.sampling import NUM_FRAMES
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.depth.capture import Frame
 from scanweld.preparation.denoise import noise_of
 
-MOST_LOOKED_AT = 24
-"""Frames, evenly spread over a capture, that are looked at together."""
 NUM_RANGES = 3
 """Ranges of depth, with as many pixels each, in which noise is measured."""
 
@@ -43,7 +42,7 @@ def capture_info(frames: Sequence[Frame]) -> CaptureInfo:
     Args:
         frames: All of its depth images, at least one.
     """
-    chosen = np.linspace(0, len(frames) - 1, min(len(frames), MOST_LOOKED_AT)).round().astype(int)
+    chosen = np.linspace(0, len(frames) - 1, min(len(frames), NUM_FRAMES)).round().astype(int)
     scans: list[RangeScan] = []
     unread: dict[str, str] = {}
     for k in chosen:

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from scanweld.errors import some_of
 from scanweld.video.records import Fate, Keyframe, Log
 
-MAX_NAMED = 5
-"""Frames that a sentence names, at most."""
 WORDS = {
     Fate.SLIDING: "show so little but a plane that they slide on it, and were not averaged",
     Fate.POOR: "fit badly (blurred, or something large moved), and were not averaged",
@@ -31,11 +30,7 @@ def words(log: Log) -> tuple[str, ...]:
     told = [f"the track of the camera breaks at {each.frame}: {each.why}" for each in log.breaks]
     for fate, what in WORDS.items():
         if names := log.named(fate):
-            more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
-            told.append(
-                f"{len(names)} of {len(log.fates)} frames {what}: "
-                f"{', '.join(names[:MAX_NAMED])}{more}"
-            )
+            told.append(f"{len(names)} of {len(log.fates)} frames {what}: {some_of(names)}")
     return tuple(told)
 
 

@@ -10,11 +10,9 @@ from scanweld.evidence.information import information_of, observability_of
 from scanweld.evidence.judge import Judge
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
+from scanweld.geometry.sampling import NUM_FEW
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
 from scanweld.sensor.model import SensorModel
-
-NUM_POINTS = 2000
-"""Surface points of a scan by which misfit is measured."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -70,7 +68,7 @@ def diagnostics_of(
     """Make the scans of a run ready to be measured."""
     return PairDiagnostics(
         judge=judge,
-        sources=[surface_source(scan, NUM_POINTS) for scan in prepared],
+        sources=[surface_source(scan, NUM_FEW) for scan in prepared],
         contours=contour_matcher(prepared, config),
         sensor=sensor,
     )

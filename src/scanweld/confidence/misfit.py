@@ -12,9 +12,8 @@ from scanweld.geometry.buckets import cells_of
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.refinement.surface_terms import SurfaceSource, surface_matches
+from scanweld.sensor.learn import PATCH_DIAMETERS
 
-PATCH_DIAMETERS = 0.06
-"""Edge of the cells over which residuals are averaged."""
 MIN_PATCH_POINTS = 6
 """Points that make a mean."""
 SURE_DEVIATIONS = 2.0

@@ -14,6 +14,7 @@ from scanweld.cut.standing import Standing, share_of_still_pairs, standing
 from scanweld.cut.table import above, supporting_planes
 from scanweld.errors import InputError
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.geometry.scan import RangeScan
 
 logger = logging.getLogger(__name__)
@@ -25,8 +26,6 @@ MAX_ELSEWHERE = 0.1
 which it is the camera that moved."""
 MAX_KEPT = 0.7
 """Share of a frame's pixels above which what is kept is no cut: nothing was around the object."""
-MAX_POINTS = 20_000
-"""Points that moved that the table is looked for under, at most."""
 REMEDY = "--object moving needs depth frames of one camera that stood still while the object moved"
 
 
@@ -112,7 +111,7 @@ def _points_of_patches(frames: Frames, moved: Sequence[BoolArray]) -> FloatArray
         large = mask & (size >= RIVAL * size.max())[patch]
         found.append(frames.camera.unproject_image(frames.depth(k))[large])
     points = np.concatenate(found)
-    return points[:: max(1, len(points) // MAX_POINTS)]
+    return points[:: max(1, len(points) // NUM_SAMPLED)]
 
 
 def _objects(

@@ -8,6 +8,7 @@ import numpy as np
 from scanweld.cut.frames import Frames
 from scanweld.cut.smoothing import Noise, noise_of, smooth_field
 from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.sampling import NUM_FRAMES
 
 SAME_SHARE_OF_DEPTH = 0.02
 """Depths that differ by less of themselves may be the same: sensors err alike in neighbouring
@@ -16,8 +17,6 @@ LEFT_SHARE_OF_DEPTH = 0.01
 """What may be left of this when it is smoothed away, where the image ends or the object begins."""
 STILL = 0.6
 """Share of the pixels seen by two frames that must be the same if the camera stood still."""
-MAX_COMPARED = 24
-"""Frames that are compared with each other, and that tell what is usual, at most."""
 STRIDE = 4
 """One pixel in so many, each way, decides whether the camera stood still."""
 SURE_SIGMAS = 5.0
@@ -105,7 +104,7 @@ def standing(frames: Frames) -> Standing:
 
 def _chosen(frames: Frames) -> list[int]:
     """Indices of frames that stand for all, evenly over their order."""
-    count = min(len(frames.scans), MAX_COMPARED)
+    count = min(len(frames.scans), NUM_FRAMES)
     return np.linspace(0, len(frames.scans) - 1, count).round().astype(int).tolist()
 
 

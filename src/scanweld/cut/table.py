@@ -10,6 +10,7 @@ from scanweld.cut.smoothing import LEAST_NOISE, smooth_field, trimmed_rms
 from scanweld.cut.standing import LEFT_SHARE_OF_DEPTH, SURE_SIGMAS, Standing
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.camera import Camera
+from scanweld.geometry.gauss_newton import NEARLY_ALL_SIGMAS
 
 NUM_SEEDS, NUM_TRIED = 24, 3000
 """Triangles across the image each of which gives a plane, and points that these are tried on."""
@@ -26,9 +27,6 @@ MAX_LIFT = 0.5
 which the object stands on it: its foot may look the same from all sides, and then not move."""
 NUM_ROUNDS = 3
 """Rounds in which the table's bend is fitted, each to what lay in it before."""
-TABLE_SIGMAS = 3.0
-"""Height above the table, in standard deviations of its own pixels, from which a pixel is not of
-it: single pixels beyond make no piece."""
 LOWEST = 0.02
 """Quantile that stands for the lowest, and share of what moved that may lie below the plane."""
 
@@ -105,8 +103,8 @@ def above(
         for _ in range(NUM_ROUNDS if flat.any() else 0):
             off = height - smooth_field(height, is_used)
             over = off / np.maximum(trimmed_rms((off / sigma)[is_used]) * sigma, least)
-            is_used = flat & (np.abs(over) <= TABLE_SIGMAS)
-        is_above &= over > TABLE_SIGMAS
+            is_used = flat & (np.abs(over) <= NEARLY_ALL_SIGMAS)
+        is_above &= over > NEARLY_ALL_SIGMAS  # single pixels beyond make no piece
     return is_above
 
 

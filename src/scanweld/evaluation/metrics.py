@@ -13,11 +13,6 @@ from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.io.poses import PoseSet
 
-MAX_ROTATION_DEG = 3.0
-"""A scan turned by more than this is wrong."""
-MAX_TRANSLATION_PERCENT = 1.5
-"""A scan shifted by more than this share of the object's diameter is wrong."""
-
 
 class Limits(NamedTuple):
     """What is still right: degrees, and percent of the object's diameter."""
@@ -26,7 +21,8 @@ class Limits(NamedTuple):
     translation_percent: float
 
 
-RIGHT = Limits(MAX_ROTATION_DEG, MAX_TRANSLATION_PERCENT)
+RIGHT = Limits(rotation_deg=3.0, translation_percent=1.5)
+"""A scan that is turned or shifted by more is wrong."""
 
 
 class Standing(StrEnum):

@@ -9,9 +9,8 @@ from scanweld.compiled.kernels import njit
 from scanweld.evidence.field import ScanField
 from scanweld.evidence.step import move, solve_damped
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.matches import MIN_AGREEMENT
 
-MIN_AGREEMENT = 0.8
-"""Cosine of the two normals below which a match is refused."""
 MIN_MATCHES = 12
 """A pose with fewer matches than this stays where it is."""
 

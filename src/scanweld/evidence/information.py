@@ -11,15 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from scanweld.evidence.field import ScanField
-from scanweld.evidence.icp import MIN_AGREEMENT, MIN_MATCHES
+from scanweld.evidence.icp import MIN_MATCHES
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import TURN_SCALE
+from scanweld.geometry.matches import MIN_AGREEMENT
 from scanweld.geometry.pose import Pose
 
 NUM_DEVIATIONS = 4.0
 """Standard deviations by which information must exceed what noise leaves of itself. They are those
 of independent matches; normals are smoothed, so that neighbours have errors in common."""
-TURN_SCALE = 3.0
-"""Rotations are multiplied by this over the diameter, so that they compare with translations."""
 
 
 TwoWayMatches = tuple[FloatArray, FloatArray, FloatArray, FloatArray]

@@ -10,8 +10,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from scanweld.evidence.information import TURN_SCALE
 from scanweld.geometry.arrays import FloatArray, frozen
+from scanweld.geometry.gauss_newton import TURN_SCALE
 
 FAR_DIAMETERS = 2.0
 """A turn about an axis farther than this from the matches is as good as a shift."""

@@ -13,12 +13,11 @@ from scanweld.fusion.posed_image import PosedImage, SingleArray
 from scanweld.fusion.sampling import sample_colors, sample_surface
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.mesh import UNCOLORED
+from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.work.threads import map_in_order
 
 logger = logging.getLogger(__name__)
 
-_NUM_COMPARED = 20_000
-"""Vertices at which the scans' exposures are compared, about."""
 _MIN_FAIR = 0.1
 """Share of the vertices common to two scans that must be neither too dark nor too bright."""
 _CLIPPED = 12.0
@@ -90,7 +89,7 @@ def exposure_gains(
     pairs where both saw the same surface, their medians, give the gains by least squares; their
     geometric mean over the scans is 1.
     """
-    step = max(1, len(vertices) // _NUM_COMPARED)
+    step = max(1, len(vertices) // NUM_SAMPLED)
     vertices, normals = vertices[::step], normals[::step]
     found = [_colors_at(image, vertices, normals, reach) for image in images]
     seen = [share > 0 for _, share in found]

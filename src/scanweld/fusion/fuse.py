@@ -23,9 +23,10 @@ from scanweld.fusion.noise import with_noise
 from scanweld.fusion.posed_image import PosedImage, free_space_trusts, pose_image
 from scanweld.fusion.sheets import NORMAL_ROUNDS, without_second_sheets
 from scanweld.fusion.surface import extract_surface, vertex_flags
-from scanweld.fusion.volume import DEPTH_SIGMAS, DEPTH_VOXELS
+from scanweld.fusion.volume import DEPTH_VOXELS
 from scanweld.fusion.voxels import image_pixels, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.gauss_newton import NEARLY_ALL_SIGMAS
 from scanweld.geometry.mesh import TriangleMesh, smoothed_normals
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
@@ -74,7 +75,7 @@ def fuse(
     stages = Stages(workers=workers, cache=cache or NoCache(), progress=silent)
     images = _images(scans, world_from_sensor, config, prepare or PrepareConfig(), stages)
     voxel = voxel_edge(scans, config)
-    depth = max(DEPTH_VOXELS * voxel, DEPTH_SIGMAS * max(image.noise for image in images))
+    depth = max(DEPTH_VOXELS * voxel, NEARLY_ALL_SIGMAS * max(image.noise for image in images))
     truncation = max(config.truncation_voxels * voxel, 2.0 * depth)
     vertices, faces, filled = _surface(images, voxel, truncation, depth, config, workers)
     if not len(faces):

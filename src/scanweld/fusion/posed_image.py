@@ -13,6 +13,7 @@ from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import MIN_COSINE, PixelKind, PreparedScan
+from scanweld.geometry.sampling import NUM_FEW
 from scanweld.preparation.prepare import surface_points
 from scanweld.preparation.range_image import (
     incidence_cosines,
@@ -34,8 +35,6 @@ _FREE_PIXELS = 10.0
 _MAX_LOST = 0.02
 """Share of another scan's surface in front of an image's free pixels at which these are trusted no
 more: the sensor lost returns."""
-_NUM_TRUST_POINTS = 2000
-"""Points of a scan with which the others' free pixels are checked, about."""
 _MARGIN_PIXELS = 2.0
 """Space around the surface that the image holds."""
 _MAX_NOISE_PIXELS = 0.5
@@ -152,7 +151,7 @@ def look_up(values: NDArray, camera: Camera, points: FloatArray) -> NDArray:
 def _sparse(image: PosedImage) -> FloatArray:
     """Some surface points (P, 3), off the rims, world frame."""
     chosen = np.flatnonzero((image.weight > 0) & ~image.is_rim)
-    chosen = chosen[:: max(1, len(chosen) // _NUM_TRUST_POINTS)]
+    chosen = chosen[:: max(1, len(chosen) // NUM_FEW)]
     row, column = np.divmod(chosen, image.camera.width)
     pixels = np.stack([column, row], axis=1).astype(np.float64)
     depth = image.depth[row, column].astype(np.float64)

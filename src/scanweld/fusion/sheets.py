@@ -18,8 +18,6 @@ _MAX_EDGES = 5
 """Vertices no more than this number of edges apart are on the same sheet."""
 _RADIUS_VOXELS = 0.75
 """Distance from a point on the normal within which a vertex of the other sheet is looked for."""
-_MAX_PEELS = 8
-"""Rounds of removing second sheets, at most; usually two or three are enough."""
 _PATCH_EDGES = 12
 """Second sheets are removed within so many edges of where they are found at first: far enough that
 the rim of such a patch changes nothing."""
@@ -63,21 +61,20 @@ def without_second_sheets(
 def _peeled(vertices: FloatArray, faces: IntArray, agreement: Agreement, voxel: float) -> IntArray:
     """The faces (G, 3) that stay."""
     index = np.arange(len(vertices))
-    for _ in range(_MAX_PEELS):
+    while True:  # each round takes faces away
         faces, parts = split_fans(faces)
         index = index[parts]
         points = vertices[index]
         other = second_sheets(points, faces, smoothed_normals(points, faces, NORMAL_ROUNDS), voxel)
         one = np.flatnonzero(other >= 0)
         if not len(one):
-            break
+            return index[faces]
         two = other[one]
         fewer = agreement.count[index[one]] - agreement.count[index[two]]
         is_worse = agreement.stdev[index[one]] > agreement.stdev[index[two]]
         goes = np.zeros(len(index), dtype=bool)
         goes[np.where((fewer < 0) | ((fewer == 0) & is_worse), one, two)] = True
         faces = faces[~goes[faces].any(axis=1)]
-    return index[faces]
 
 
 def second_sheets(

@@ -14,9 +14,8 @@ BLOCK = 8
 KEY_BITS = 20
 """Voxel and block coordinates are below 2^20, so that three of them fit into one number."""
 DEPTH_VOXELS = 1.5
-"""Weights fall to nothing this far behind a surface, where the other side of a wall may be,"""
-DEPTH_SIGMAS = 3.0
-"""or so many standard deviations of the noise, if that is more."""
+"""Weights fall to nothing this far behind a surface, where the other side of a wall may be; or
+as far behind it as its noise reaches, if that is more."""
 _MIN_DEEP_VOXELS = 0.7
 """Voxels at least this far behind the surface are taken to be inside with certainty."""
 MIN_EMPTY = 0.3

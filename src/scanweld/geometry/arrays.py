@@ -12,6 +12,9 @@ IndexArray = NDArray[np.signedinteger]
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 
+LARGEST_EXACT = 2**53
+"""Above this a double does not hold all whole numbers, nor a digit behind the point."""
+
 
 def frozen(values: ArrayLike, dtype: type[np.generic], shape: tuple[int | None, ...]) -> NDArray:
     """A read-only, C-ordered array of the given type; ``None`` in the shape stands for any length.

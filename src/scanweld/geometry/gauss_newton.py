@@ -16,6 +16,8 @@ MAD_TO_SIGMA = 1.4826
 """Standard deviation of normally distributed residuals over their median magnitude."""
 DAMPING = 1e-6
 """Added to the diagonal, relative to its mean: what no match determines stays where it is."""
+NEARLY_ALL_SIGMAS = 3.0
+"""Standard deviations within which nearly all errors lie (99.7 %)."""
 SIGNIFICANT_SIGMAS = 4.0
 """Standard deviations beyond which a difference is taken for real, not for noise (1 in 16,000)."""
 TURN_SCALE = 3.0

@@ -1,6 +1,7 @@
 """Triangle meshes: fused models, virtual objects, and the surface between an image's pixels."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 
@@ -9,12 +10,17 @@ from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IntArray,
 
 MIN_PIECE_SHARE = 0.002
 """Connected pieces that are smaller than this share of a surface are taken for noise."""
+SMOOTHING_ROUNDS = 2
+"""Rounds in which what is noisy at vertices is averaged with their neighbours'."""
 UNCOLORED = 128
 """Grey (0 to 255) of what has no colour where the rest has one."""
-BORDER = -1
-"""For the face on the other side of an edge, where there is none,"""
-IN_CONFLICT = -2
-"""or where faces do not fit together along an edge."""
+
+
+class NoEdge(IntEnum):
+    """Instead of the other face's edge along an edge."""
+
+    BORDER = -1
+    IN_CONFLICT = -2
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -80,7 +86,7 @@ def smoothed_normals(vertices: FloatArray, faces: IntArray, rounds: int) -> Floa
 
 def border_edges(faces: IntArray, num_vertices: int) -> tuple[IntArray, IntArray]:
     """First and last vertices (B,) of the edges that only one face has, as it runs along them."""
-    once = np.flatnonzero(opposite_edges(faces, num_vertices) == BORDER)
+    once = np.flatnonzero(opposite_edges(faces, num_vertices) == NoEdge.BORDER)
     return faces.ravel()[once], faces.ravel()[next_corner(once)]
 
 
@@ -94,8 +100,8 @@ def border_vertices(faces: IntArray, num_vertices: int) -> BoolArray:
 def opposite_edges(faces: IntArray, num_vertices: int) -> IntArray:
     """The edge (3 F,) of the other face along each face's edge; edge 3 f + k starts at corner k.
 
-    ``BORDER`` where no other face has the edge, ``IN_CONFLICT`` where more than two have it, or two
-    that do not agree on their outside.
+    ``NoEdge.BORDER`` where no other face has the edge, ``IN_CONFLICT`` where more than
+    two have it, or two that do not agree on their outside.
     """
     faces = np.array(faces, order="C")
     return _opposite_edges(faces, *corners_at(faces, num_vertices))
@@ -146,10 +152,10 @@ def _opposite_edges(
     end = np.empty_like(order)
     for k, edge in enumerate(order):
         end[k] = faces[edge // 3, (edge + 1) % 3]
-    found = np.full(len(order), IN_CONFLICT)
+    found = np.full(len(order), NoEdge.IN_CONFLICT.value)
     for first in range(len(start) - 1):
         for k in range(start[first], start[first + 1]):
-            last, other, alike, against = end[k], BORDER, 0, 0
+            last, other, alike, against = end[k], NoEdge.BORDER.value, 0, 0
             for m in range(start[first], start[first + 1]):
                 alike += end[m] == last
             for m in range(start[last], start[last + 1]):

@@ -10,6 +10,9 @@ from scanweld.geometry.arrays import BoolArray, ByteArray, FloatArray, IndexArra
 from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
 
+MOST_BEHIND = 0.01
+"""Share of the points, strays, that may lie behind a sensor which is said to have seen them."""
+
 
 class Viewpoint(StrEnum):
     """How it is known where a scan's sensor stood."""

@@ -13,10 +13,9 @@ import numpy as np
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.geometry.scan import principal_diameter
 
-_LOOKED_AT = 20_000
-"""Points at which it is told in which steps coordinates come; fewer cannot hide them."""
 _FEWEST = 100
 """Points that tell steps from chance; fewer are no scan, which preparing them says."""
 _NEAR_SINGLE = 0.05
@@ -39,7 +38,7 @@ def refuse_coarse(path: Path, points: FloatArray, *, are_vertices: bool = False)
     """
     if len(points) < _FEWEST or np.abs(points).max() > np.finfo(np.float32).max:
         return
-    some = points[:: -(-len(points) // _LOOKED_AT)]
+    some = points[:: -(-len(points) // NUM_SAMPLED)]
     single = _single_step(some)
     decimal = 0.0 if are_vertices else _common_step(some) / _COPIES
     if max(single, decimal) == 0.0:

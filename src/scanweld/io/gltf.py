@@ -8,6 +8,7 @@ import struct
 from base64 import b64decode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import LARGEST_EXACT, FloatArray
 from scanweld.io.matrices import rotation_of_quaternion
 
-_COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _LOOKS = ("materials", "texture", "lights", "xmp")
 """Words in the names of extensions that change no point."""
-_LARGEST = 1e15
-"""Coordinates that are larger have no digit left behind the point."""
 _HEAD, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
+
+
+class Component(IntEnum):
+    """Types of numbers in arrays, named by NumPy's codes."""
+
+    i1 = 5120
+    u1 = 5121
+    i2 = 5122
+    u2 = 5123
+    u4 = 5125
+    f4 = 5126
+
+
+class Element(IntEnum):
+    """What an array holds one after the other, and of how many numbers that is."""
+
+    SCALAR = 1
+    VEC2 = 2
+    VEC3 = 3
+    VEC4 = 4
+
+
+class Target(IntEnum):
+    """What the bytes of a buffer are for."""
+
+    VERTICES = 34962
+    INDICES = 34963
+
+
+class Mode(IntEnum):
+    """What the vertices of a primitive make, of what is read."""
+
+    POINTS = 0
+    TRIANGLES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +94,9 @@ class Gltf:
             ReadError: If it is broken or packed.
         """
         told = self._entry("accessors", index)
-        kind = _COMPONENTS.get(_hashable(told.get("componentType")))
-        width = _WIDTHS.get(_hashable(told.get("type")), 0)
+        code = told.get("componentType")
+        kind = Component(code).name if code in [*Component] else None
+        width = Element.__members__.get(_hashable(told.get("type")), 0)
         count = self._number(told, "count")
         if kind is None or width not in widths or "sparse" in told or "bufferView" not in told:
             raise self.broken("holds arrays that are sparse, packed or of a wrong type")
@@ -150,7 +182,7 @@ class Gltf:
             vector = np.array([float(each) for each in values])
         except OverflowError:
             vector = np.array([np.inf])
-        if not (np.abs(vector) < _LARGEST).all():
+        if not (np.abs(vector) < LARGEST_EXACT).all():
             raise self.broken("a node's motion is too large")
         return vector
 

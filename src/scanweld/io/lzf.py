@@ -4,16 +4,14 @@ import numpy as np
 
 from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import ByteArray
-
-MOST_EXPANSION = 88
-"""Bytes that a byte can stand for: three bytes copy at most 264."""
+from scanweld.io.unpack import MOST_EXPANSION
 
 
 def lzf_decompress(data: ByteArray, size: int) -> ByteArray | None:
     """The ``size`` bytes that compressed data stands for; None if it is broken, or stands for more.
 
     Args:
-        data: (N,) compressed, at most 88 times smaller.
+        data: (N,) compressed, three bytes of which stand for 264 at most.
         size: Of the result.
     """
     if size > MOST_EXPANSION * len(data):

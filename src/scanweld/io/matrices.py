@@ -38,3 +38,11 @@ def rotation_of_quaternion(xyzw: FloatArray) -> FloatArray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def from_opengl(world_from_camera: Pose) -> Pose:
+    """The pose of a camera with y up and z towards the viewer, with y down and z away."""
+    return Pose(
+        rotation=world_from_camera.rotation * [1.0, -1.0, -1.0],
+        translation=world_from_camera.translation,
+    )

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from scanweld.errors import WriteError
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
+from scanweld.io.gltf import Component, Mode, Target
 from scanweld.io.local_origin import find_shift, shift_text
+from scanweld.io.scan_formats.stl import FACET, HEAD
 
 _TURNS = {
     "x": [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
@@ -17,10 +19,7 @@ _TURNS = {
     "z": [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
 }
 """Rotations that bring an axis to +Y; for those that point down, half a turn about Z follows."""
-_METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-_STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
-_FLOAT, _UINT = 5126, 5125
-_VERTICES, _INDICES = 34962, 34963
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
 def obj_bytes(mesh: TriangleMesh) -> bytes:
@@ -53,7 +52,7 @@ def stl_bytes(mesh: TriangleMesh) -> bytes:
         WriteError: If the mesh has no faces, which is all that an STL holds.
     """
     _require_faces(mesh, "STL")
-    facets = np.zeros(len(mesh.faces), dtype=_STL_FACET)
+    facets = np.zeros(len(mesh.faces), dtype=FACET)
     normals = face_normals(mesh.vertices, mesh.faces)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     facets["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
@@ -62,7 +61,7 @@ def stl_bytes(mesh: TriangleMesh) -> bytes:
     facets["corners"] = corners if shift is None else corners - shift
     about = "coordinates in the unit of the scans" if shift is None else shift_text(shift)
     head = f"binary STL, {about}".encode("ascii").ljust(80)
-    return head + struct.pack("<I", len(facets)) + facets.tobytes()
+    return HEAD.pack(head, len(facets)) + facets.tobytes()
 
 
 def glb_bytes(mesh: TriangleMesh, unit: str | None = None, up: str = "y") -> bytes:
@@ -81,7 +80,7 @@ def glb_bytes(mesh: TriangleMesh, unit: str | None = None, up: str = "y") -> byt
     """
     _require_faces(mesh, "GLB")
     turn = _gltf_from_mesh(up)
-    scale = 1.0 if unit is None else _METRES[unit]
+    scale = 1.0 if unit is None else METRES[unit]
     shift = find_shift(mesh.vertices)
     local = mesh.vertices if shift is None else mesh.vertices - shift
     buffer = _Buffer()
@@ -91,7 +90,7 @@ def glb_bytes(mesh: TriangleMesh, unit: str | None = None, up: str = "y") -> byt
     if mesh.colors is not None:
         attributes["COLOR_0"] = buffer.add(_linear(mesh.colors))
     faces = buffer.add_indices(mesh.faces)
-    primitive = {"attributes": attributes, "indices": faces, "material": 0, "mode": 4}
+    primitive = {"attributes": attributes, "indices": faces, "material": 0, "mode": Mode.TRIANGLES}
     node: dict[str, object] = {"mesh": 0, "name": "model"}
     if shift is not None:
         node["translation"] = (scale * turn @ shift + 0.0).tolist()
@@ -140,11 +139,13 @@ class _Buffer:
         bounds: dict[str, object] = {}
         if with_bounds:
             bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        return self._add(values, len(values), "VEC3", _FLOAT, _VERTICES, bounds)
+        return self._add(values, len(values), "VEC3", Component.f4, Target.VERTICES, bounds)
 
     def add_indices(self, faces: NDArray) -> int:
         """Add faces (F, 3), likewise."""
-        return self._add(faces.astype("<u4"), faces.size, "SCALAR", _UINT, _INDICES, {})
+        return self._add(
+            faces.astype("<u4"), faces.size, "SCALAR", Component.u4, Target.INDICES, {}
+        )
 
     def _add(
         self,

@@ -8,8 +8,6 @@ from scanweld.io.text import is_number
 from scanweld.io.text_encoding import UTF_16
 from scanweld.io.unpack import GZIP
 
-BEGIN = 200
-"""Bytes that tell."""
 _OTHERS = (
     ((GZIP,), "is packed by gzip", "add .gz to its name"),
     ((b"pk\3\4",), "is a ZIP archive", "unpack it"),

@@ -3,14 +3,13 @@
 import numpy as np
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
+from scanweld.geometry.sampling import NUM_FEW
 
 _MANY = 10
 """So many points at the very same place, or with the very same coordinate far beyond all others,
 were not measured."""
 _SHARE = 0.01
 """Of all points, that copies elsewhere than at the origin must have: coarse files have a few."""
-_SAMPLES = 4000
-"""Points that are looked at for a place with copies, and for the order of a grid."""
 _BEYOND = 10.0
 """Factor by which a value that stands for nothing is larger than all that were measured."""
 _CLEAR = 0.7
@@ -77,7 +76,7 @@ def grid_in_order(points: FloatArray, is_seen: BoolArray) -> IntArray | None:
 
 def _usual_place(points: FloatArray) -> FloatArray:
     """The place (3,) of most of a sample of points."""
-    sample = points[:: max(1, len(points) // _SAMPLES)]
+    sample = points[:: max(1, len(points) // NUM_FEW)]
     sample = sample[np.isfinite(sample).all(axis=1)]
     if not len(sample):
         return np.zeros(3)
@@ -106,5 +105,5 @@ def _median_step(points: FloatArray, is_seen: BoolArray, lag: int) -> float:
     both = np.flatnonzero(is_seen[lag:] & is_seen[:-lag])
     if len(both) < _MANY:
         return np.inf
-    both = both[:: max(1, len(both) // _SAMPLES)]
+    both = both[:: max(1, len(both) // NUM_FEW)]
     return float(np.median(np.linalg.norm(points[both + lag] - points[both], axis=1)))

@@ -4,10 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from scanweld.errors import some_of
 from scanweld.io.names import natural_key, printable, suffix_of
-
-_MAX_GROUPS = 8
-"""Kinds of files that a message names."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -92,8 +90,7 @@ def inventory(paths: Sequence[Path], only_named: frozenset[str]) -> str:
     # What might have been meant comes first.
     told = sorted(groups, key=lambda kind: foreign_kind(groups[kind][0]) is None)
     words = [_words(kind, groups[kind], only_named) for kind in told]
-    left = len(words) - _MAX_GROUPS
-    return ", ".join([*words[:_MAX_GROUPS], *([f"and {left} kinds more"] if left > 0 else [])])
+    return some_of(words)
 
 
 def _words(kind: str, paths: Sequence[Path], only_named: frozenset[str]) -> str:

@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,13 @@ def decode_body(header: PlyHeader, data: bytes) -> dict[str, Columns]:
     return tables
 
 
-_TOO_SHORT, _NO_LENGTH = -1, -2
+class _Fault(IntEnum):
+    """Instead of where the rows end."""
+
+    TOO_SHORT = -1
+    NO_LENGTH = -2
+
+
 _FLOAT, _SIGNED = ord("f"), ord("i")
 
 
@@ -166,9 +173,9 @@ def _walk(
     layout = np.array([sizes, count_sizes, kinds])
     octets = np.frombuffer(body, np.uint8)
     begins, lengths, end = _find_lists(octets, start, element.count, layout, order == ">")
-    if end == _TOO_SHORT:
+    if end == _Fault.TOO_SHORT:
         raise _BodyError
-    if end == _NO_LENGTH:
+    if end == _Fault.NO_LENGTH:
         raise _BodyError("a list's length is not a whole number from 0 up")
     return begins, lengths, end
 
@@ -209,7 +216,7 @@ def _find_lists(
         for k in range(len(sizes)):
             size, kind = count_sizes[k], kinds[k]
             if at + size > len(octets):
-                return begins, lengths, _TOO_SHORT
+                return begins, lengths, _Fault.TOO_SHORT.value
             if size > 0:
                 length = 0.0
                 for i in range(size):
@@ -222,15 +229,15 @@ def _find_lists(
                     if kind == _SIGNED and word[size - 1] >= 128:
                         length = -1.0
                 if not (length >= 0 and length == np.floor(length)):
-                    return begins, lengths, _NO_LENGTH
+                    return begins, lengths, _Fault.NO_LENGTH.value
                 if length > len(octets):
-                    return begins, lengths, _TOO_SHORT
+                    return begins, lengths, _Fault.TOO_SHORT.value
                 lengths[row, k] = np.int64(length)
                 at += size
             begins[row, k] = at
             at += sizes[k] * lengths[row, k]
             if at > len(octets):
-                return begins, lengths, _TOO_SHORT
+                return begins, lengths, _Fault.TOO_SHORT.value
     return begins, lengths, at
 
 

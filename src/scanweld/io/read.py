@@ -16,12 +16,13 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.local_origin import SHIFT_KEY, told_shift
-from scanweld.io.misnamed import BEGIN, what_it_is
+from scanweld.io.misnamed import what_it_is
 from scanweld.io.names import is_gzipped, stem_of, suffix_of
 from scanweld.io.not_scans import why_unread
 from scanweld.io.raw import RawScan, to_mesh, to_scan
 from scanweld.io.scan_formats.records import Keeps, Part
 from scanweld.io.scan_formats.registry import format_of, formats_by_suffix
+from scanweld.io.text_encoding import BEGIN
 from scanweld.io.unpack import gunzip
 
 _any_bits = np.errstate(over="ignore", invalid="ignore")
@@ -91,7 +92,7 @@ def _parts(path: Path) -> Sequence[Part]:
     try:
         found = form.read(path, data)
     except ReadError as error:
-        begin = _first_bytes(path) if form.opens_path else data[:BEGIN]
+        begin = _first_bytes(path) if form.opens_path else data[BEGIN]
         if told := what_it_is(path, begin):
             raise ReadError(f"{path}: {told}") from error
         raise
@@ -105,7 +106,7 @@ def _parts(path: Path) -> Sequence[Part]:
 def _first_bytes(path: Path) -> bytes:
     """Those of a file that its reader opens itself."""
     with path.open("rb") as stream:
-        return stream.read(BEGIN)
+        return stream.read(BEGIN.stop)
 
 
 def _told_shift(path: Path, data: bytes) -> FloatArray | None:

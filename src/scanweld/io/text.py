@@ -18,7 +18,7 @@ _NOT_A_NUMBER = re.compile(
 _FORTRAN = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 """Double precision as Fortran prints it: 1.5D+02."""
 _EXPONENT = bytes.maketrans(b"dD", b"ee")
-_MAX_DIGITS = 15
+_MAX_DIGITS = np.finfo(np.float64).precision
 """A number of so many digits is exact in double precision,"""
 _POWERS = 10.0 ** np.arange(23)
 """and so are these powers of ten: multiplied or divided by one it is rounded once, as it should."""

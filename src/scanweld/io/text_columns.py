@@ -13,8 +13,6 @@ from scanweld.io.text import is_any_number
 from scanweld.io.text_head import axis_name, row_cells
 
 _FIRST_LINE = slice(0, 2**16)
-FIRST_ROWS = slice(0, 1000)
-"""Most that is not so is not so here already, and the rest need not be looked at."""
 INDEX_NOTE = "first column left out: it counts the points"
 
 _NAMES = {
@@ -81,7 +79,7 @@ def is_index(column: FloatArray) -> bool:
     """Whether a column (N,) counts: 1, 2, 3 and so on, from whatever whole number."""
     if len(column) < 3 or column[0] != np.rint(column[0]):
         return False
-    return all((part[1:] == part[:-1] + 1).all() for part in (column[FIRST_ROWS], column))
+    return bool((column[1:] == column[:-1] + 1).all())
 
 
 def scan_of_columns(table: FloatArray, columns: Columns) -> RawScan:

@@ -14,8 +14,8 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 """That of UTF-32 begins with that of UTF-16, so it is tried first."""
-_BEGIN = slice(0, 400)
-"""Where a text would show its zero bytes."""
+BEGIN = slice(0, 400)
+"""Of a file: bytes that tell what it is, and where a text would show its zero bytes."""
 
 
 def plain_text(path: Path, data: bytes) -> bytes:
@@ -27,8 +27,8 @@ def plain_text(path: Path, data: bytes) -> bytes:
     encoding = next((name for mark, name in _MARKS if data.startswith(mark)), None)
     if encoding == "utf-8":
         data, encoding = data.removeprefix(codecs.BOM_UTF8), None
-    elif encoding is None and b"\0" in data[_BEGIN]:
-        encoding = _without_mark(path, data[_BEGIN])
+    elif encoding is None and b"\0" in data[BEGIN]:
+        encoding = _without_mark(path, data[BEGIN])
     if encoding is not None:
         try:
             data = data.decode(encoding).encode()

@@ -8,7 +8,7 @@ import numpy as np
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.io.names import suffix_of
-from scanweld.io.text_columns import FIRST_ROWS, INDEX_NOTE, Columns, is_index
+from scanweld.io.text_columns import INDEX_NOTE, Columns, is_index
 
 _MOST_COLUMNS = 12
 """Wider texts without column names are tables of something else."""
@@ -91,16 +91,11 @@ def _are_colors(values: FloatArray) -> bool:
 
 def _are_unit_vectors(vectors: FloatArray) -> bool:
     """Whether all vectors (N, 3) are of length 1, to two digits, or zero (unknown)."""
-    known = False
-    for part in (vectors[FIRST_ROWS], vectors):
-        with np.errstate(over="ignore"):
-            lengths = np.linalg.norm(part[(part != 0).any(axis=1)], axis=1)
-        lengths = lengths[np.isfinite(lengths)]
-        known = len(lengths) > 0
-        if (np.abs(lengths - 1) >= 0.02).any():
-            return False
-    return known
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(vectors[(vectors != 0).any(axis=1)], axis=1)
+    lengths = lengths[np.isfinite(lengths)]
+    return len(lengths) > 0 and bool((np.abs(lengths - 1) < 0.02).all())
 
 
 def _only_rises(column: FloatArray) -> bool:
-    return all((part[1:] > part[:-1]).all() for part in (column[FIRST_ROWS], column))
+    return bool((column[1:] > column[:-1]).all())

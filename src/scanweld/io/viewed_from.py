@@ -4,9 +4,7 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose, nearest_rotation
-
-_MOST_BEHIND = 0.01
-"""Share of the points, strays, that may lie behind a sensor which is said to have seen them."""
+from scanweld.geometry.scan import MOST_BEHIND
 
 
 def viewpoint_told(
@@ -45,7 +43,7 @@ def seen_from(points: FloatArray, place: FloatArray) -> Pose | None:
     rays = finite - place
     axis = rays.mean(axis=0)
     length = float(np.linalg.norm(axis))
-    if not np.isfinite(length) or not length > 0 or (rays @ axis <= 0).mean() > _MOST_BEHIND:
+    if not np.isfinite(length) or not length > 0 or (rays @ axis <= 0).mean() > MOST_BEHIND:
         return None
     axis = axis / length
     right = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scanweld.compiled.kernels import njit
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import BoolArray, IntArray
+from scanweld.geometry.arrays import LARGEST_EXACT, BoolArray, IntArray
 from scanweld.io.text import parse_numbers
 
 _TYPES = {
@@ -18,8 +18,6 @@ _TYPES = {
     **{"float": "f4", "double": "f8", "vtkidtype": "i4", "vtktypeint64": "i8"},
 }
 _LINE = re.compile(rb"[ \t]*([^\r\n]*)(\r\n|\n|\r|$)")
-_LARGEST_INDEX = 2**53
-"""Above this a double, as which the numbers of ASCII files are read, is not exact."""
 _COUNT = re.compile(r"\d{1,12}")
 
 
@@ -124,7 +122,7 @@ class VtkBody:
     def _integers(self, count: int, kind: str) -> IntArray:
         """The same for whole numbers."""
         values = self.values(count, kind)
-        if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST_INDEX).all():
+        if values.dtype.kind == "f" and not (np.abs(values) < LARGEST_EXACT).all():
             raise self.broken("its cells are not made of whole numbers")
         return values.astype(np.int64)
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from scanweld.errors import some_of
 from scanweld.evidence.evidence import MIN_AGREE
 from scanweld.evidence.judge import Judge
 from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
@@ -14,9 +15,6 @@ from scanweld.knowledge.facts import Knowledge
 from scanweld.knowledge.turntable import MIN_SCANS, Turntable, turning_pairs
 from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import FactReport, FactVerdict
-
-MAX_NAMED = 5
-"""Scans that a sentence names, at most."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -153,8 +151,7 @@ def _by_name(scans: Sequence[int] | Mapping[int, object], names: Mapping[int, st
 
 
 def _listed(what: str, items: Sequence[str]) -> str:
-    more = f" and {len(items) - MAX_NAMED} more" if len(items) > MAX_NAMED else ""
-    return f"{what}: {', '.join(items[:MAX_NAMED])}{more}"
+    return f"{what}: {some_of(items)}"
 
 
 def _edge(pair: tuple[str, str], registered: Registered) -> Edge | None:

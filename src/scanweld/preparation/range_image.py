@@ -9,6 +9,7 @@ from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.grid import GAP_ROUNDS, grid_faces
 from scanweld.geometry.mesh import (
     MIN_PIECE_SHARE,
+    SMOOTHING_ROUNDS,
     TriangleMesh,
     border_vertices,
     pieces,
@@ -33,8 +34,6 @@ twice as many pixels, finer than its points: else the rims would take most of it
 POINT_PIXELS = 1.6
 """Size of a pixel of points without a grid or faces, in point spacings: smaller pixels would leave
 most of the surface empty."""
-NORMAL_SMOOTHING_ROUNDS = 2
-"""Rounds in which a normal is averaged with those of the neighbours along the mesh."""
 
 
 def make_range_image(
@@ -263,7 +262,7 @@ def _depth_faces(
 
 def _smoothed_normals(points: FloatArray, faces: IntArray, camera: Camera) -> FloatArray:
     """Area-weighted normals (V, 3), averaged over the neighbours along the mesh, to the sensor."""
-    normals = smoothed_normals(points, faces, NORMAL_SMOOTHING_ROUNDS)
+    normals = smoothed_normals(points, faces, SMOOTHING_ROUNDS)
     lonely = ~(np.abs(normals).sum(axis=1) > 0)
     normals[lonely] = -camera.view_directions(points[lonely])
     return normals

@@ -4,9 +4,8 @@ import numpy as np
 
 from scanweld.compiled.kernels import njit
 from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.sampling import NUM_FEW
 
-NUM_QUERIES = 2000
-"""Points whose nearest neighbour is looked up; the median of so many is good to 2 %."""
 _ASKED = 4
 """Points nearest to each, itself among them: where all of them coincide, it has no neighbour."""
 _DIRECTION = np.array([0.48, 0.64, 0.6])
@@ -18,7 +17,7 @@ def point_spacing(points: FloatArray) -> float:
 
     Exact duplicates do not count as neighbours. Zero if all points coincide.
     """
-    queries = np.arange(0, len(points), max(1, len(points) // NUM_QUERIES))
+    queries = np.arange(0, len(points), max(1, len(points) // NUM_FEW))
     nearest = _nearest_distinct(points, queries)
     nearest = nearest[np.isfinite(nearest)]
     return float(np.median(nearest)) if len(nearest) else 0.0

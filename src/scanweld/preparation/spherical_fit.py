@@ -10,11 +10,8 @@ from scanweld.errors import InputError
 from scanweld.geometry.arrays import FloatArray, IndexArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose, nearest_rotation
-from scanweld.geometry.scan import RangeScan
+from scanweld.geometry.scan import MOST_BEHIND, RangeScan
 from scanweld.preparation.camera_fit import MAX_RMS_PIXELS, CameraFit
-
-_MOST_BEHIND = 0.01
-"""Share of the points that may lie behind a scanner that looks to their middle."""
 
 
 def fit_spherical(scan: RangeScan) -> tuple[CameraFit, IntArray] | None:
@@ -48,7 +45,7 @@ def fit_spherical(scan: RangeScan) -> tuple[CameraFit, IntArray] | None:
     rms = float(np.hypot(u[2], v[2]))
     if not rms <= MAX_RMS_PIXELS:
         return None
-    if (np.abs(azimuth) > np.pi / 2).mean() > _MOST_BEHIND:
+    if (np.abs(azimuth) > np.pi / 2).mean() > MOST_BEHIND:
         raise InputError(
             f"{scan.name}: the scanner stands amid what it saw; cut the object out of the scan"
         )

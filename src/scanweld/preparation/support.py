@@ -8,12 +8,11 @@ import numpy as np
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.gauss_newton import SIGNIFICANT_SIGMAS
+from scanweld.geometry.sampling import NUM_FEW
 from scanweld.geometry.scan import principal_diameter
 
 NUM_DRAWS = 300
 """Planes through three points that are tried."""
-NUM_TRIED = 2000
-"""Points that they are tried on, at most."""
 FLAT_SPACINGS = 1.5
 """Distance from a plane, in point spacings, up to which a point lies in it."""
 MIN_SHARE = 0.15
@@ -64,7 +63,7 @@ def find_support(points: FloatArray, spacing: float) -> BoolArray | None:
 def _main_plane(points: FloatArray, reach: float) -> tuple[FloatArray, float] | None:
     """Unit normal, towards the sensor, and offset of the plane that holds most points."""
     rng = np.random.default_rng(0)
-    tried = points[rng.permutation(len(points))[:NUM_TRIED]]
+    tried = points[rng.permutation(len(points))[:NUM_FEW]]
     a, b, c = (tried[rng.integers(len(tried), size=NUM_DRAWS)] for _ in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)

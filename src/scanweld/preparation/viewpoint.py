@@ -9,13 +9,12 @@ import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import face_normals
+from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.resolution import point_spacing
 
-MAX_POINTS = 20_000
-"""Points of a scan that the last step of the search uses, at most,"""
 FIRST_POINTS = 6_000
-"""and those that the first steps use."""
+"""Points of a scan that the first steps of the search use, at most; the last uses more."""
 NUM_COARSE = 300
 """Directions on the half sphere that are tried first, about 8 deg apart."""
 NUM_FINE = 2_000
@@ -57,7 +56,7 @@ def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray,
     )
     best = candidates[int(np.argmin(_costs(first, candidates, cell)))]
 
-    dense = _thinned(centred, MAX_POINTS)
+    dense = _thinned(centred, NUM_SAMPLED)
     cell = CELL_SPACINGS * point_spacing(dense)
     cap = _cap(fine, best, CAP_DEG)
     costs = _costs(dense, cap, cell)
@@ -71,14 +70,14 @@ def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray,
 def surface_points(scan: RangeScan) -> FloatArray:
     """At most 20,000 points of a scan; of a mesh, spread evenly over its faces."""
     if scan.faces is None or not len(scan.faces):
-        return _thinned(scan.points, MAX_POINTS)
+        return _thinned(scan.points, NUM_SAMPLED)
     areas = np.linalg.norm(face_normals(scan.points, scan.faces), axis=1)
     if not areas.sum() > 0:
-        return _thinned(scan.points, MAX_POINTS)
+        return _thinned(scan.points, NUM_SAMPLED)
     rng = np.random.default_rng(0)
-    steps = (np.arange(MAX_POINTS) + 0.5) / MAX_POINTS
+    steps = (np.arange(NUM_SAMPLED) + 0.5) / NUM_SAMPLED
     chosen = np.searchsorted(np.cumsum(areas) / areas.sum(), steps)
-    u, v = rng.random((2, MAX_POINTS, 1))
+    u, v = rng.random((2, NUM_SAMPLED, 1))
     a, b, c = (scan.points[scan.faces[chosen, k]] for k in range(3))
     return a + (1 - np.sqrt(u)) * (b - a) + np.sqrt(u) * v * (c - a)
 

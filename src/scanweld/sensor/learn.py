@@ -12,6 +12,7 @@ from scanweld.evidence.field import ScanField
 from scanweld.evidence.information import two_way_matches
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.buckets import cells_of
+from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.certain import Edge, certain_pairs
@@ -64,7 +65,7 @@ def learn_sensor(
             max_contradiction=usual_contradiction,
             diameter=diameter,
         )
-    sigma = 1.4826 * float(np.median(np.abs(residuals)))
+    sigma = MAD_TO_SIGMA * float(np.median(np.abs(residuals)))
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
     closure = closure_displacement(pairs, fields, diameter)
     across = closure / np.sqrt(3.0)  # of a displacement that prefers no direction

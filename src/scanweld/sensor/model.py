@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from scanweld.evidence.evidence import NO_LIMIT, PatchLimits
+from scanweld.geometry.gauss_newton import NEARLY_ALL_SIGMAS
 
 MARGIN = (
     "empty pixels nearer than {:.1%} to the border of what a scan shows say nothing: right poses "
@@ -12,8 +13,6 @@ CLOSURE = (
     "around cycles poses of pairs miss each other by {:.1%} each, as where depth is bent over "
     "whole scans"
 )
-MATCH_SIGMAS = 3.0
-"""Farthest match, in standard deviations of the distance between surfaces."""
 SPREAD_SIGMAS, NUM_SPREAD_BINS = 5.0, 41
 """How far the spread of the distances is told, in standard deviations, and in how many bins."""
 
@@ -58,7 +57,7 @@ class SensorModel:
     @property
     def reach(self) -> float:
         """How far apart surfaces that should coincide may lie, in the scans' unit."""
-        return MATCH_SIGMAS * self.sigma
+        return NEARLY_ALL_SIGMAS * self.sigma
 
     @property
     def limits(self) -> PatchLimits:

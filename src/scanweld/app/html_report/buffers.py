@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scanweld.geometry.arrays import FloatArray, IntArray
 
-LARGEST = 65535
+LARGEST = np.iinfo(np.uint16).max
 """Of a coordinate, after quantising."""
 TYPES: Mapping[str, str] = {"uint8": "u1", "int8": "i1", "uint16": "<u2", "int32": "<i4"}
 """Types of the arrays, by numpy's name."""

@@ -15,8 +15,6 @@ from scanweld.geometry.prepared import PreparedScan
 
 NUM_PAIRS = 4
 """Pairs that are shown."""
-MARGIN = 6
-"""Pixels around the object."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -98,8 +96,8 @@ def _panel(i: PreparedScan, j: PreparedScan, j_from_i: Pose, config: ContoursCon
 
 def _view_box(surface: BoolArray) -> str:
     rows, columns = np.nonzero(surface)
-    left, top = int(columns.min()) - MARGIN, int(rows.min()) - MARGIN
-    right, bottom = int(columns.max()) + MARGIN, int(rows.max()) + MARGIN
+    left, top = int(columns.min()), int(rows.min())
+    right, bottom = int(columns.max()), int(rows.max())
     return f"{left} {top} {right - left + 1} {bottom - top + 1}"
 
 

@@ -18,8 +18,6 @@ GREYS = (235.0, 60.0)
 """Of what is near and of what is far."""
 KEPT = (0.35, 0.8, 0.55)
 """How the grey of pixels that were kept is tinted."""
-COLOR_WIDTH = 160
-"""The same of one of colours, which takes more bytes."""
 NOTHING = (24, 28, 40)
 """Colour of pixels that saw nothing."""
 
@@ -60,7 +58,7 @@ def _is_colored(scan: RangeScan) -> bool:
 
 def _colors(scan: RangeScan) -> ByteArray:
     assert scan.grid is not None and scan.colors is not None
-    step = -(-scan.grid.shape[1] // COLOR_WIDTH)
+    step = -(-scan.grid.shape[1] // WIDTH)
     grid = scan.grid[::step, ::step]
     return np.where((grid >= 0)[..., None], scan.colors[grid], np.array(NOTHING, dtype=np.uint8))
 

@@ -7,9 +7,6 @@ import numpy as np
 from scanweld.geometry.arrays import FloatArray
 
 NUM_BINS = 40
-SHOWN_SHARE = 0.995
-"""Share of the residuals that the axis covers; the last bar holds the rest as well."""
-MIN_POINTS = 10
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -34,13 +31,11 @@ class Histogram:
 
 
 def histogram(distances: FloatArray) -> Histogram | None:
-    """The histogram of distances (N,) without sign; None where there are too few."""
-    if len(distances) < MIN_POINTS:
+    """The histogram of distances (N,) without sign; None where there are none."""
+    if not len(distances):
         return None
-    median, p90, p99, largest = (
-        float(value) for value in np.quantile(distances, [0.5, 0.9, 0.99, SHOWN_SHARE])
-    )
-    largest = largest or 1.0
+    median, p90, p99 = (float(value) for value in np.quantile(distances, [0.5, 0.9, 0.99]))
+    largest = p99 or 1.0
     counts, _ = np.histogram(np.minimum(distances, largest), NUM_BINS, range=(0.0, largest))
     return Histogram(
         shares=tuple((counts / len(distances)).tolist()),

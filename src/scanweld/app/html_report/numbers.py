@@ -2,7 +2,8 @@
 
 import math
 
-_METRES = {"m": 1.0, "cm": 0.01}
+from scanweld.io.mesh_write import METRES
+
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -25,7 +26,7 @@ def length(value: float | None, unit: str | None) -> str:
     """A length with three digits, and its unit if that is known; less than a metre in mm."""
     if value is None or _is_missing(value):
         return "–"
-    metres = value * _METRES.get(unit or "", 0.0)
+    metres = value * METRES[unit] if unit in ("m", "cm") else 0.0
     if 0 < metres < 1:
         value, unit = 1000 * metres, "mm"
     return f"{_plain(value)}\u00a0{unit}" if unit else _plain(value)

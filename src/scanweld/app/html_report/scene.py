@@ -32,7 +32,7 @@ MAX_SHOWN = 160_000
 """Vertices of the model on the page, and points of all scans together, at most."""
 RESIDUAL_QUANTILE = 0.98
 """Of the residuals at vertices; the colours end there."""
-NO_VALUE = 255
+NO_VALUE = np.iinfo(np.uint8).max
 """Byte that says that a vertex has no residual."""
 
 

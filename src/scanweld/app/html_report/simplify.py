@@ -3,9 +3,7 @@
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
-
-GROWTH = 1.1
-"""By how much the cells grow until few enough are left."""
+from scanweld.preparation.thinning import SLACK
 
 
 def cluster_vertices(vertices: FloatArray, at_most: int) -> IntArray:
@@ -21,7 +19,7 @@ def cluster_vertices(vertices: FloatArray, at_most: int) -> IntArray:
         numbers, cluster = np.unique(key, return_inverse=True)
         if len(numbers) <= at_most:
             return cluster.reshape(-1).astype(np.int64)
-        cell *= GROWTH
+        cell *= max(SLACK, np.sqrt(len(numbers) / at_most))
 
 
 def cluster_means(cluster: IntArray, values: FloatArray) -> FloatArray:

@@ -9,14 +9,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
-from scanweld.geometry.mesh import TriangleMesh, face_normals, vertex_normals
+from scanweld.geometry.mesh import SMOOTHING_ROUNDS, TriangleMesh, face_normals, vertex_normals
 
 MAX_POINTS = 300_000
 """Points of all scans together that are held against the surface; beyond, every k-th is."""
 REACH_EDGES = 6.0
 """A point farther from all vertices than so many median edges is off the model."""
-SMOOTHING_ROUNDS = 2
-"""How often residuals are averaged with the neighbours', for the picture only."""
 THIN = 1
 """A place seen by so many scans, or fewer, is thinly supported."""
 

@@ -8,8 +8,6 @@ import numpy as np
 from scanweld.app.model_files import PairEntry
 from scanweld.pairs.result import PairKind
 
-SIZE = 420.0
-RADIUS = 158.0
 LEVELS = 5
 """Steps of strength that are drawn differently."""
 FULL_SCORE = 0.6
@@ -18,13 +16,11 @@ FULL_SCORE = 0.6
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Node:
-    """A scan on the circle; its label stands outside, turned where many stand close."""
+    """A scan on the unit circle, y down; its label stands outside, turned where many are close."""
 
     name: str
     x: float
     y: float
-    label_x: float
-    label_y: float
     turn: float
     anchor: str
 
@@ -111,14 +107,12 @@ def _places(groups: Sequence[Sequence[str]]) -> Mapping[str, float]:
     return angles
 
 
-def _point(angle: float, radius: float) -> tuple[float, float]:
-    x, y = SIZE / 2 + radius * np.sin(angle), SIZE / 2 - radius * np.cos(angle)
-    return round(float(x), 2), round(float(y), 2)
+def _point(angle: float) -> tuple[float, float]:
+    return round(float(np.sin(angle)), 4), round(-float(np.cos(angle)), 4)
 
 
 def _node(name: str, angle: float, is_turned: bool) -> Node:
-    x, y = _point(angle, RADIUS)
-    label_x, label_y = _point(angle, RADIUS + 13)
+    x, y = _point(angle)
     is_right = angle < np.pi - 1e-6
     is_middle = abs(np.sin(angle)) < 1e-6 and not is_turned
     turn = np.degrees(angle) - (90 if is_right else 270) if is_turned else 0.0
@@ -127,16 +121,14 @@ def _node(name: str, angle: float, is_turned: bool) -> Node:
         name=name,
         x=x,
         y=y,
-        label_x=label_x,
-        label_y=label_y,
         turn=round(float(turn), 2),
         anchor=anchor,
     )
 
 
 def _link(pair: PairEntry, places: Mapping[str, float], thinner: float) -> Link:
-    x1, y1 = _point(places[pair.i], RADIUS)
-    x2, y2 = _point(places[pair.j], RADIUS)
+    x1, y1 = _point(places[pair.i])
+    x2, y2 = _point(places[pair.j])
     level = pair_level(pair) if pair.accepted else None
     width = 1.2 if level is None else 0.8 + 0.9 * level
     return Link(pair=pair, x1=x1, y1=y1, x2=x2, y2=y2, level=level, width=round(width * thinner, 2))

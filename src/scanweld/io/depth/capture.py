@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from scanweld.errors import InputError, ReadError
 from scanweld.geometry.pose import Pose
+from scanweld.geometry.sampling import NUM_FRAMES
 from scanweld.geometry.scan import RangeScan
 from scanweld.io.collect import ScanFile, collect
 from scanweld.io.depth.frame import FrameSettings, camera_of, read_frame, read_mask_of
@@ -28,8 +29,6 @@ from scanweld.io.depth.scale import DepthScale, find_scale
 from scanweld.io.names import printable
 from scanweld.io.poses import PoseSet
 
-_MOST_LOOKED_AT = 20
-"""Images, evenly spread over a set, from which its scale is found."""
 _NO_COLORS = Path("none")
 
 
@@ -101,7 +100,7 @@ class DepthImages:
         """
         found = self._with_files(shots_of(self.inputs))
         paths = [shot.depth for shot in found.shots]
-        looked_at = _readable(paths[:: -(-len(paths) // _MOST_LOOKED_AT)])
+        looked_at = _readable(paths[:: -(-len(paths) // NUM_FRAMES)])
         intrinsics = self._intrinsics(found)
         masks = {shot.depth: shot.mask for shot in found.shots if shot.mask is not None}
         for path, values in looked_at.items():

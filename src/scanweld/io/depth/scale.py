@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 
-_INVALID = 65535
+_INVALID = np.iinfo(np.uint16).max
 """What some cameras write where they saw nothing, besides 0."""
 _ROTATED_BITS = 3
 _SMOOTHER = 4.0

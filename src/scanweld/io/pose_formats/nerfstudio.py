@@ -16,6 +16,7 @@ from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
 from scanweld.io.local_origin import shifted
+from scanweld.io.matrices import from_opengl
 from scanweld.io.pose_formats.colmap import IMAGE_SUFFIX, PIXEL_CENTRE
 from scanweld.io.pose_formats.records import (
     Entry,
@@ -28,7 +29,6 @@ from scanweld.io.pose_formats.records import (
 from scanweld.io.poses import load_json
 
 TITLE = "nerfstudio"
-_SENSOR_FROM_OPENGL = Pose(rotation=np.diag([1.0, -1.0, -1.0]), translation=np.zeros(3))
 _FOLDER = "images/"
 _SHIFT = "shift"
 """Our key of the local origin that the world is about where it lies far off."""
@@ -71,7 +71,7 @@ def write(scans: Sequence[PosedScan]) -> dict[str, str]:
 
 def _frame(scan: PosedScan) -> dict[str, Any]:
     camera = scan.pinhole(TITLE)
-    world_from_opengl = scan.world_from_sensor() @ _SENSOR_FROM_OPENGL
+    world_from_opengl = from_opengl(scan.world_from_sensor())
     return {
         "file_path": f"{_FOLDER}{scan.name}{IMAGE_SUFFIX}",
         "fl_x": camera.fx,
@@ -102,4 +102,4 @@ def _pose(path: Path, name: str, rows: Sequence[Any], origin: FloatArray) -> Pos
     flat = [x for row in rows for x in (row if isinstance(row, list) else [row])]
     if not all(type(x) in (int, float) for x in flat):
         raise ReadError(f"{path}: {name}: the matrix holds what is no number; write it anew")
-    return shifted(parse_pose(path, name, flat) @ _SENSOR_FROM_OPENGL.inverse(), origin)
+    return shifted(from_opengl(parse_pose(path, name, flat)), origin)

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
-from scanweld.io.gltf import Gltf, parse_glb
+from scanweld.io.gltf import Gltf, Mode, parse_glb
 from scanweld.io.raw import RawScan, to_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
-
-_POINTS, _TRIANGLES = 0, 4
 
 
 def read_glb(path: Path, data: bytes) -> RawScan:
@@ -58,9 +56,9 @@ def _parts(
 ) -> Iterator[tuple[FloatArray, IntArray | None, FloatArray | None, ByteArray | None]]:
     """Points, faces, normals and colours of a mesh's primitives that are points or triangles."""
     for primitive in gltf.entries(mesh, "primitives"):
-        mode = primitive.get("mode", _TRIANGLES)
+        mode = primitive.get("mode", Mode.TRIANGLES)
         names = primitive.get("attributes")
-        if mode not in (_POINTS, _TRIANGLES) or not isinstance(names, dict):
+        if mode not in [*Mode] or not isinstance(names, dict):
             raise gltf.broken("holds strips, fans or lines; export it as triangles or points")
         if "POSITION" not in names:
             continue
@@ -68,7 +66,7 @@ def _parts(
         if points.dtype.kind != "f":
             raise gltf.broken("its points are packed as whole numbers")
         faces = None
-        if mode == _TRIANGLES:
+        if mode == Mode.TRIANGLES:
             corners = np.arange(len(points))
             if "indices" in primitive:
                 corners = gltf.accessor(primitive["indices"], (1,)).astype(np.int64).ravel()

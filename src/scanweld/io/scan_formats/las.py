@@ -12,10 +12,8 @@ from scanweld.io.raw import RawScan, side_by_side, to_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat, needed
 from scanweld.io.unpack import MOST_EXPANSION, SMALL
 
-_LASZIP_RECORD = 22204
-"""Number of the record that tells how a LAZ file is packed,"""
 _UNCHUNKED = b"\1\0"
-"""and how it begins where the points are one piece."""
+"""How the record of the packing begins where the points are one piece."""
 
 
 def read_las(path: Path, data: bytes) -> RawScan:
@@ -87,7 +85,8 @@ def _too_long(path: Path) -> ReadError:
 
 def _check_packing(path: Path, data: bytes, header: Any) -> None:
     """Refuse a packed file at which what lies below laspy would panic, and print that it does."""
-    told = [vlr.record_data_bytes() for vlr in header.vlrs if vlr.record_id == _LASZIP_RECORD]
+    packing = needed(path, "laspy", "las").vlrs.known.LasZipVlr.official_record_ids()
+    told = [vlr.record_data_bytes() for vlr in header.vlrs if vlr.record_id in packing]
     if any(record[:2] == _UNCHUNKED for record in told):
         raise ReadError(f"{path}: is packed without chunks, as LASzip 1 did; unpack it to LAS")
     if _num_chunks(data, _start(data)) > len(data):

@@ -10,9 +10,6 @@ from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text import plain_number
 
-_NO_INDEX = 2**31
-"""No file has so many vertices."""
-
 
 def read_obj(path: Path, data: bytes) -> RawScan:
     """Vertices, their colours (if written behind the coordinates) and faces of an OBJ file.
@@ -52,7 +49,7 @@ def read_obj(path: Path, data: bytes) -> RawScan:
 def _obj_index(word: bytes, num_vertices: int) -> int:
     """The vertex of a corner such as 7, 7/1, 7//3 or -1 (the last one so far), from 0."""
     index = int(word.partition(b"/")[0])
-    if index == 0 or not -num_vertices <= index < _NO_INDEX:
+    if index == 0 or not -num_vertices <= index <= np.iinfo(np.int32).max:
         raise ValueError("OBJ counts from 1, or back from -1")
     return index - 1 if index > 0 else num_vertices + index
 

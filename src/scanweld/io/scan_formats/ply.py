@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanweld.errors import ReadError
-from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
+from scanweld.geometry.arrays import LARGEST_EXACT, ByteArray, FloatArray, IntArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.pose import Pose
 from scanweld.io.matrices import pose_from_numbers
@@ -32,8 +32,6 @@ _OF_MODELS = ("confidence", "support", "stdev", "filled", "scan")
 _KNOWN = {*"xyz", "intensity", "alpha", *_OF_MODELS}.union(*_NORMALS, *_COLORS)
 """Properties of a vertex that are read, or need no word."""
 _ELEMENTS = ("vertex", "face", "range_grid", "camera")
-_LARGEST_INDEX = 2**53
-"""Above this a double, as which the numbers of ASCII files are read, is not exact."""
 _SHORT_NUMBER = re.compile(r"[0-9]{1,9}")
 _PLACE = ("view_px", "view_py", "view_pz")
 _AXES = tuple(f"{axis}_axis{part}" for axis in "xyz" for part in "xyz")
@@ -142,7 +140,7 @@ def _index_list(path: Path, columns: Columns) -> tuple[IntArray | ByteArray, Int
     if not isinstance(column, Ragged):
         return None
     values = column.values
-    if not ((np.abs(values) < _LARGEST_INDEX) & (values == np.rint(values))).all():
+    if not ((np.abs(values) < LARGEST_EXACT) & (values == np.rint(values))).all():
         raise ReadError(f"{path}: a vertex index is not a whole number; export the file anew")
     return column.counts, values.astype(np.int64)
 

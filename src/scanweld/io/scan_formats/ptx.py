@@ -19,7 +19,6 @@ from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.scan_formats.records import Keeps, Part, ScanFormat
 from scanweld.io.text import parse_numbers, words_per_line
 
-_HEAD_LINES = 10
 _HEAD_WIDTHS = (1, 1, 3, 3, 3, 3, 4, 4, 4, 4)
 _WIDTHS = (4, 7)
 
@@ -36,7 +35,7 @@ def read_ptx(path: Path, data: bytes) -> list[Part]:
     parts = []
     at, line = _skip_blank(text, 0, 1)
     while at < len(text):
-        begin, _ = _after_lines(text, at, _HEAD_LINES)
+        begin, _ = _after_lines(text, at, len(_HEAD_WIDTHS))
         head = _head(path, data[at:begin], line)
         columns, rows = (int(number) for number in head[:2])
         end, found = _after_lines(text, begin, columns * rows)
@@ -45,7 +44,7 @@ def read_ptx(path: Path, data: bytes) -> list[Part]:
                 f"{path}: scan {len(parts) + 1} has {found} of its {columns} x {rows} cells "
                 "(truncated, or a wrong count); copy it again or export it anew"
             )
-        body_line = line + _HEAD_LINES
+        body_line = line + len(_HEAD_WIDTHS)
         parts.append(Part(read=partial(_scan, path, data[begin:end], body_line, head)))
         at, line = _skip_blank(text, end, body_line + columns * rows)
     return parts

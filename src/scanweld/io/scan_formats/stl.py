@@ -1,5 +1,6 @@
 """STL, ASCII or binary: faces, whose coinciding corners become one vertex."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,13 @@ from scanweld.io.raw import RawScan
 from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.text import is_number
 
-_STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
-_STL_HEAD = 84
 _ENDS = (b"endsolid", b"ENDSOLID")
 _ZERO = np.float32(0)
 """Added to minus zero it gives zero, whose bits are others."""
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+"""Of a binary file, behind"""
+HEAD = struct.Struct("<80sI")
+"""any words, and the number of facets."""
 
 
 def read_stl(path: Path, data: bytes) -> RawScan:
@@ -28,20 +31,20 @@ def read_stl(path: Path, data: bytes) -> RawScan:
     Raises:
         ReadError: If it is neither kind of STL, or truncated.
     """
-    num_facets = int.from_bytes(data[80:_STL_HEAD], "little")
-    size = _STL_HEAD + _STL_FACET.itemsize * num_facets
+    num_facets = HEAD.unpack_from(data)[1] if len(data) >= HEAD.size else 0
+    size = HEAD.size + FACET.itemsize * num_facets
     if len(data) == size:
-        facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEAD)
+        facets = np.frombuffer(data, FACET, num_facets, HEAD.size)
         corners = (facets["corners"] + _ZERO).reshape(-1, 3)
     elif data.lstrip()[:5].lower() == b"solid" and any(word in data for word in _ENDS):
         corners = _ascii_corners(path, data) + _ZERO
-    elif num_facets and 0 < len(data) - size < _STL_HEAD:
+    elif num_facets and 0 < len(data) - size < HEAD.size:
         raise ReadError(f"{path}: goes on behind its {num_facets} triangles; export it anew")
     else:
         raise ReadError(f"{path}: not an STL file, or a truncated one; copy it again")
     if len(corners) % 3:
         raise ReadError(f"{path}: {len(corners)} corners do not make triangles; export it anew")
-    points, index = _merged(corners)
+    points, index = _merged(corners + 0.0)  # minus zero becomes zero, whose bits are others
     faces = index.reshape(-1, 3)
     a, b, c = faces.T
     is_whole = (a != b) & (b != c) & (c != a)

@@ -5,6 +5,7 @@ POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID (whose points are a grid) are re
 """
 
 from collections.abc import Callable
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,14 @@ from scanweld.io.scan_formats.records import Keeps, ScanFormat
 from scanweld.io.vtk_body import VtkBody
 
 _DATASETS = ("POLYDATA", "UNSTRUCTURED_GRID", "STRUCTURED_GRID")
-_POLYGONS = (5, 7, 9)
-"""Types of cells that are polygons: triangle, polygon, quad."""
+
+
+class Polygon(IntEnum):
+    """Types of cells that are polygons."""
+
+    TRIANGLE = 5
+    POLYGON = 7
+    QUAD = 9
 
 
 def read_vtk(path: Path, data: bytes) -> RawScan:
@@ -122,7 +129,7 @@ class _Sections:
         if self.cells is None or len(self.cells[0]) != len(types):
             raise self.body.broken("its CELL_TYPES are not as many as its CELLS")
         counts, corners = self.cells
-        is_polygon = np.isin(types, _POLYGONS)
+        is_polygon = np.isin(types, [*Polygon])
         faces = fan_triangles(counts[is_polygon], corners[np.repeat(is_polygon, counts)])
         self.faces = faces if len(faces) else None
 

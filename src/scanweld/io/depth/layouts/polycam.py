@@ -14,15 +14,19 @@ from scanweld.io.depth.layouts.records import (
     Layout,
     Shot,
     fitted,
-    from_opengl,
     images_in,
     pose_or_none,
 )
+from scanweld.io.matrices import from_opengl
 from scanweld.io.poses import load_json, read_text
 
 _CAMERAS = {"corrected_cameras": "corrected_images", "cameras": "images"}
 """Folders of cameras and of the colour images that are theirs."""
-_ROWS = [f"t_{row}{column}" for row in range(3) for column in range(4)]
+_ROWS = (
+    *("t_00", "t_01", "t_02", "t_03"),
+    *("t_10", "t_11", "t_12", "t_13"),
+    *("t_20", "t_21", "t_22", "t_23"),
+)
 
 
 def recognise(folder: Path) -> bool:

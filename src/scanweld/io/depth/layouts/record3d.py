@@ -12,8 +12,9 @@ from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
 from scanweld.io.depth.images import by_name
 from scanweld.io.depth.intrinsics import intrinsics_of_entry
-from scanweld.io.depth.layouts.records import Layout, Shot, fitted, from_opengl, images_in
+from scanweld.io.depth.layouts.records import Layout, Shot, fitted, images_in
 from scanweld.io.depth.pixels import SUFFIXES
+from scanweld.io.matrices import from_opengl
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion
 
 _FILES = ("metadata.json", "metadata")

@@ -107,14 +107,6 @@ def pose_or_none(numbers: Sequence[float]) -> Pose | None:
         return None
 
 
-def from_opengl(world_from_camera: Pose) -> Pose:
-    """The pose of a camera with y up and z towards the viewer, with y down and z away."""
-    return Pose(
-        rotation=world_from_camera.rotation * [1.0, -1.0, -1.0],
-        translation=world_from_camera.translation,
-    )
-
-
 def fitted(intrinsics: Intrinsics, image: Path) -> Intrinsics:
     """Intrinsics of a colour image for a depth image that shows the same view in another size.
 
