@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.virtual.handheld import D435, EXACT, DepthSensor, looking
+from benchmarks.virtual.handheld import (
+    D435,
+    EXACT,
+    DepthSensor,
+    around,
+    looking,
+    table_with,
+)
 from scanweld.video.keyframes import keyframes
 from scanweld.video.levels import choose_levels, planes_of
 from scanweld.video.noise import DepthNoise, depth_noise
 from scanweld.video.records import Fate, Keyframe, Log, VideoFrame
+from tests.scenes import small_creature
 from tests.videos import (
     CAMERA,
     KINECT,
@@ -37,6 +45,18 @@ def test_keyframes_are_where_the_camera_stood():
     for each in found[1:]:
         angle, shift = _pose_error(made, each, found[0])
         assert angle < 0.3 and shift < 0.006  # of a way of 0.6 m, 1 % of which is 6 mm
+
+
+def test_a_thing_on_a_table_holds_a_track_that_the_table_does_not():
+    mesh, middle = table_with(small_creature(), 0.2, 0.0), np.array([0.0, 0.0, 0.08])
+    for seed in (1, 2):
+        way = around(middle, 0.5, np.linspace(0.0, 350.0, 300), np.random.default_rng(seed))
+        made = video(way[:30], mesh=mesh)
+        found, log = tracked(made.frames)
+        assert log.breaks == [] and sum(each.num_frames for each in found) >= 28
+        for each in found[1:]:
+            angle, shift = _pose_error(made, each, found[0])
+            assert angle < 2.5 and shift < 0.02  # what slides on the table is off by 200 mm
 
 
 def test_averaging_lowers_noise_by_the_root_of_the_number_of_frames():

@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from scanweld.cut import cut_out
+from scanweld.cut import Stood, cut_out
 from scanweld.cut.frames import depth_image
 from scanweld.errors import ReadError
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.sampling import NUM_FRAMES
 from scanweld.geometry.scan import RangeScan
-from scanweld.io.depth.capture import Frame
+from scanweld.io.depth.capture import Frame, start_poses
 from scanweld.preparation.denoise import noise_of
 
 NUM_RANGES = 3
@@ -59,7 +59,9 @@ def capture_info(frames: Sequence[Frame]) -> CaptureInfo:
     depths = [depth_image(scan) for scan in scans]
     rows["range"] = _range(depths)
     rows["noise"] = _noise(depths)
-    cut = cut_out(scans, "auto")
+    start = start_poses(frames)
+    stood = start and Stood(poses=start.poses, components=start.components)
+    cut = cut_out(scans, "auto", stood)
     rows["object"] = _object(frames, scans, cut.kept, cut.reason)
     return CaptureInfo(rows=rows, scans=scans, kept=cut.kept, unread=unread)
 

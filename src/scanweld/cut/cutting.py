@@ -1,4 +1,4 @@
-"""Whole frames of a standing camera -> what moved in them; all other scans as they are."""
+"""Whole frames -> what moved in them, or what they look at; all other scans as they are."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scanweld.choices import Shown
+from scanweld.cut.carried import Stood, looked_at, meeting_of
 from scanweld.cut.frames import Frames, frames_of
 from scanweld.cut.masks import with_only
 from scanweld.cut.pieces import RIVAL, moving_pieces, objects_of
@@ -29,6 +30,9 @@ MAX_KEPT = 0.7
 REMEDY = "--object moving needs depth frames of one camera that stood still while the object moved"
 
 
+ALL = "all is to be kept"
+
+
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class CutSet:
     """Scans after the cut.
@@ -38,36 +42,40 @@ class CutSet:
         kept: (H, W) cells of the grid that were kept, by the name of each scan that was cut.
         empty: Reason for each scan of which nothing is left, by name.
         reason: Why nothing was cut, if so.
+        is_carried: Whether the camera was carried around the object; else it stood still.
     """
 
     scans: tuple[RangeScan, ...]
     kept: Mapping[str, BoolArray] = field(default_factory=dict)
     empty: Mapping[str, str] = field(default_factory=dict)
     reason: str = ""
+    is_carried: bool = False
 
 
-def cut_out(scans: Sequence[RangeScan], shown: Shown) -> CutSet:
-    """Cut what moved out of whole frames of a camera that stood still.
+def cut_out(scans: Sequence[RangeScan], shown: Shown, stood: Stood | None = None) -> CutSet:
+    """Cut the object out of whole frames.
 
     Args:
         scans: Any, names unique.
-        shown: "auto" leaves scans alone that are no such frames; "moving" insists that they are;
-            "all" leaves all scans alone.
+        shown: "auto" cuts what moved before a camera that stood still, or what a camera that was
+            carried around looked at, and leaves all other scans alone; "moving" insists that
+            something moved; "all" leaves all scans alone.
+        stood: Where the camera stood, as far as it is known.
 
     Returns:
-        The scans, of frames what moved; the very same ones if there was nothing to cut.
+        The scans, of frames the object; the very same ones if there was nothing to cut.
 
     Raises:
         InputError: If it is to be "moving", but nothing is known to have moved.
     """
-    found = _kept(scans) if shown != "all" else "all is to be kept"
+    found = _kept(scans, stood if shown == "auto" else None) if shown != "all" else ALL
     if isinstance(found, str):
         if shown == "moving":
             raise InputError(f"{found}; {REMEDY}")
         logger.debug("nothing is cut: %s", found)
         return CutSet(scans=tuple(scans), reason=found)
     empty = {
-        name: "nothing moved in this frame: it shows the table and the background alone"
+        name: "the object is not seen in this frame: it shows the table and the background alone"
         for name, mask in found.items()
         if not mask.any()
     }
@@ -79,12 +87,14 @@ def cut_out(scans: Sequence[RangeScan], shown: Shown) -> CutSet:
     return CutSet(scans=tuple(cut), kept=found, empty=empty)
 
 
-def _kept(scans: Sequence[RangeScan]) -> dict[str, BoolArray] | str:
-    """The cells (H, W) of each frame that show what moved, by name; or why nothing is cut."""
+def _kept(scans: Sequence[RangeScan], stood: Stood | None) -> dict[str, BoolArray] | str:
+    """The cells (H, W) of each frame that show the object, by name; or why nothing is cut."""
     frames = frames_of(scans)
     if isinstance(frames, str):
         return frames
     still = share_of_still_pairs(frames)
+    if still < MOST_PAIRS and stood is not None:
+        return _kept_of_looked_at(frames, stood)
     if still < MOST_PAIRS:
         return (
             f"the camera moved, or the object fills the frames: {still:.0%} of the pairs of frames "
@@ -96,6 +106,30 @@ def _kept(scans: Sequence[RangeScan]) -> dict[str, BoolArray] | str:
     if not len(points):
         return "nothing moved between the frames, as far as their noise lets one see"
     return _checked(frames, moved, _objects(frames, background, moved, points))
+
+
+def _kept_of_looked_at(frames: Frames, stood: Stood) -> dict[str, BoolArray] | str:
+    """The same of frames of a camera that moved."""
+    meeting = meeting_of(frames, stood)
+    objects = looked_at(frames, meeting) if not isinstance(meeting, str) else meeting
+    if isinstance(objects, str):
+        return objects
+    kept, shares = {}, []
+    for scan, pixels in zip(frames.scans, objects, strict=True):
+        kept[scan.name] = _mask(pixels, frames)
+        shares.append(len(pixels) / len(scan.points))
+    if 2 * sum(map(bool, shares)) < len(shares):
+        return "the camera moved, and nothing stands where it looked at in most of the frames"
+    if np.median([share for share in shares if share]) > MAX_KEPT:
+        return "the frames show little besides the object"
+    return kept
+
+
+def _mask(pixels: IntArray, frames: Frames) -> BoolArray:
+    """Flat indices as a mask (H, W)."""
+    own = np.zeros((frames.camera.height, frames.camera.width), dtype=bool)
+    own.ravel()[pixels] = True
+    return own
 
 
 def _points_of_patches(frames: Frames, moved: Sequence[BoolArray]) -> FloatArray:
@@ -133,8 +167,7 @@ def _checked(
     """The objects as masks by the scans' names, or why they are none."""
     kept, shares, inside, outside = {}, [], [0, 0], [0, 0]
     for scan, mask, pixels in zip(frames.scans, moved, objects, strict=True):
-        own = np.zeros(mask.shape, dtype=bool)
-        own.ravel()[pixels] = True
+        own = _mask(pixels, frames)
         assert scan.grid is not None
         rest = (scan.grid >= 0) & ~own
         kept[scan.name] = own

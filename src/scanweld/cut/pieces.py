@@ -80,6 +80,34 @@ def pieces_of(depth: FloatArray, is_used: BoolArray, noise: Noise, camera: Camer
     return connected(*links, depth.size).reshape(depth.shape)
 
 
+def piece_around(
+    place: FloatArray, radius: float, depth: FloatArray, numbers: IntArray, camera: Camera
+) -> IntArray:
+    """Flat pixel indices of the piece with most pixels near a place, and what hangs with it.
+
+    Args:
+        place: (3,) in the camera's frame.
+        radius: Up to where a point is near; pieces that lie elsewhere for the most part are
+            other things.
+        depth: (H, W) of the frame.
+        numbers: (H, W) of the pieces, -1 where there is none.
+        camera: Of the frames.
+    """
+    flat = np.flatnonzero(numbers >= 0)
+    points = camera.unproject_image(depth).reshape(-1, 3)
+    number = numbers.ravel()[flat]
+    near = np.linalg.norm(points[flat] - place, axis=1) <= radius
+    size = np.bincount(number) if len(number) else np.zeros(0, dtype=np.int64)
+    inside = np.bincount(number, weights=near, minlength=len(size))
+    chosen = np.flatnonzero((size >= MIN_PIXELS) & (2 * inside >= size))
+    chosen = chosen[np.argsort(-inside[chosen], kind="stable")]
+    masks = tuple(flat[number == k] for k in chosen)
+    if not masks:
+        return np.empty(0, dtype=np.int64)
+    pieces = Pieces(masks=masks, points=tuple(points[mask] for mask in masks))
+    return np.sort(np.concatenate([masks[k] for k in _together_with(0, pieces)]))
+
+
 def objects_of(frames: Sequence[Pieces]) -> list[IntArray]:
     """Flat pixel indices of the object in each frame, empty where it is not seen.
 

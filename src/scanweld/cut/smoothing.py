@@ -73,6 +73,19 @@ def noise_of(deviations: FloatArray, depth: FloatArray) -> Noise:
     return Noise(depth=middle, sigma=np.maximum(sigma, LEAST_NOISE * middle))
 
 
+def uneven(image: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """By how much single depths (H, W) err, and these: both (N,).
+
+    On a smooth surface only noise is left of how a depth differs from the middle of its neighbours,
+    and it has 3/2 of its variance. Differences at jumps are many times larger; ``noise_of`` leaves
+    out the largest.
+    """
+    middle = image[:, 1:-1]
+    difference = middle - 0.5 * (image[:, :-2] + image[:, 2:])
+    is_smooth = np.isfinite(difference)
+    return difference[is_smooth] / np.sqrt(1.5), middle[is_smooth]
+
+
 def trimmed_rms(deviations: FloatArray) -> float:
     """Standard deviation about 0 of normal deviations (N,) of which a fifth may be anything."""
     size = np.abs(deviations)

@@ -4,15 +4,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from scanweld.config import Config
-from scanweld.cut import CutSet, camera_of, cut_out, mask_text
+from scanweld.cut import CutSet, Stood, camera_of, cut_out, mask_text
 from scanweld.geometry.scan import RangeScan
+from scanweld.io import PoseSet
 from scanweld.reconstruction import Reconstruction
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
 
 
-def cut_scans(scans: Sequence[RangeScan], config: Config, stages: Stages) -> CutSet:
-    """Cut the object out of a run's scans, if they are whole frames of a standing camera.
+def cut_scans(
+    scans: Sequence[RangeScan], start: PoseSet | None, config: Config, stages: Stages
+) -> CutSet:
+    """Cut the object out of a run's scans, if they are whole frames.
+
+    Args:
+        scans: Of the run.
+        start: Where a camera that moved stood, if that is known.
+        config: Settings of every stage.
+        stages: Bookkeeping of the run.
 
     Raises:
         InputError: If what moves is asked for, and nothing does.
@@ -20,7 +29,8 @@ def cut_scans(scans: Sequence[RangeScan], config: Config, stages: Stages) -> Cut
     if config.object == "all" or camera_of(scans) is None:
         return cut_out(scans, config.object)
     with stages.stage("cut") as counts:
-        cut = cut_out(scans, config.object)
+        stood = start and Stood(poses=start.poses, components=start.components)
+        cut = cut_out(scans, config.object, stood)
         counts["cut"] = len(cut.kept)
     for name, reason in cut.empty.items():
         stages.progress(ScanRefused(scan=name, reason=reason))

@@ -74,9 +74,10 @@ def run(
         runner=runner,
     )
     with single_threaded_algebra():
-        cut = cut_scans(scans, config, stages)
+        known = knowledge or Knowledge()
+        cut = cut_scans(scans, known.start, config, stages)
         refused = {**(unreadable or {}), **cut.empty}
-        intake = take_in(cut.scans, refused, knowledge or Knowledge(), config, stages)
+        intake = take_in(cut.scans, refused, known, config, stages)
         return with_kept(reconstruct(intake, config, stages), cut)
 
 

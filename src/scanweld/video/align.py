@@ -11,20 +11,23 @@ from numpy.typing import NDArray
 from scanweld.evidence.information import information_from
 from scanweld.evidence.slippage import Slide, slippage_of
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TURN_SCALE
+from scanweld.geometry.gauss_newton import DAMPING, MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TURN_SCALE
 from scanweld.geometry.pose import Pose, nearest_rotation
 from scanweld.geometry.scan import principal_diameter
 from scanweld.video.levels import LevelChoice, halvings, planes_of, unit_normals
 from scanweld.video.match import FRONT, LEAST_SPREAD, MIN_MATCHES, matches, settle
 from scanweld.video.noise import DepthNoise
 
-ROUNDS = 10, 5, 4
-"""Rounds of matching from the coarsest image to finer ones, as in KinectFusion; the last number
-holds for all finer ones."""
+ROUNDS = 10, 5, 6
+"""Rounds of matching from the coarsest image to finer ones, about as in KinectFusion; the last
+number holds for all finer ones."""
 REACH = 0.04, 0.01
 """Share of the depth up to which pixels match, in the first round and the last: hands move a camera
 by less from one frame to the next, beside where it was heading, and sensors err by up to the last,
 alike in neighbouring pixels."""
+HELD = 1e-3
+"""Damping in coarse images, relative to the mean diagonal: small things that hold a pose are not
+seen in them, and what slides without these would wander off. Finer images set the rest right."""
 MAX_NORMALS = 10_000
 """Matches whose normals are asked how firmly they hold a pose, about."""
 
@@ -144,15 +147,18 @@ def align(frame: Pyramid, target: Target, start: Pose) -> Alignment:
     for k, level in enumerate(levels.chosen()):
         depth = frame.images[level]
         found = Matches(*(np.zeros(depth.shape, kind) for kind in (np.int32, float, float)))
+        reach = np.geomspace(reaches[k], reaches[k + 1], ROUNDS[min(k, len(ROUNDS) - 1)])
         spread = settle(
             depth,
             target.planes[level],
             levels.cameras[level].parameters,
             row,
             frame.noise.halved(level).terms,
-            np.geomspace(reaches[k], reaches[k + 1], ROUNDS[min(k, len(ROUNDS) - 1)]),
+            reach,
+            _widths(reach, level == levels.finest),
             target.centre,
             TURN_SCALE / target.diameter,
+            DAMPING if level == levels.finest else HELD,
             *found,
         )
     pose = Pose(rotation=nearest_rotation(row[:9].reshape(3, 3)), translation=row[9:])
@@ -166,6 +172,11 @@ def align(frame: Pyramid, target: Target, start: Pose) -> Alignment:
         spread=float(spread),
         slide=_slide(frame, target, pose, found) if overlap > 0 else None,
     )
+
+
+def _widths(reaches: FloatArray, is_finest: bool) -> FloatArray:
+    """How far errors may be, besides noise, to count in each round: nothing in the last ones."""
+    return reaches * np.maximum(np.linspace(1.0, -1.0 if is_finest else 1.0, len(reaches)), 0.0)
 
 
 def _share_back(frame: Pyramid, target: Target, pose: Pose) -> float:

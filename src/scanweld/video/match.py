@@ -2,7 +2,8 @@
 
 Matches are projective (Blais & Levine 1995) and their errors point to plane (Chen & Medioni 1991),
 as in KinectFusion. Each error is divided by what the noise of its depth makes of it, and weighted
-by Tukey's biweight.
+by Tukey's biweight, which at first is as wide as the reach of the matches: where a table fills most
+of the frame, and fits at once, what stands on it would else be an outlier before it has moved.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from scanweld.compiled.kernels import njit
 from scanweld.evidence.step import move, solve_damped
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import DAMPING, MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TUKEY
+from scanweld.geometry.gauss_newton import MAD_TO_SIGMA, SIGNIFICANT_SIGMAS, TUKEY
 
 OFF_GRID_PIXELS = 0.3
 """Standard deviation of where in its pixel a depth was seen, across the line of sight."""
@@ -115,6 +116,7 @@ def accumulate(
     errors: FloatArray,
     sigmas: FloatArray,
     spread: float,
+    width: float,
     centre: FloatArray,
     turn_scale: float,
     h: FloatArray,
@@ -126,7 +128,7 @@ def accumulate(
     for v, u in np.ndindex(depth.shape):
         if hits[v, u] < 0:
             continue
-        ratio = errors[v, u] / (TUKEY * spread * sigmas[v, u])
+        ratio = errors[v, u] / (TUKEY * spread * sigmas[v, u] + width * depth[v, u])
         if abs(ratio) >= 1.0:
             continue
         weight = ((1.0 - ratio * ratio) / sigmas[v, u]) ** 2
@@ -160,8 +162,10 @@ def settle(
     pose: FloatArray,
     noise: FloatArray,
     reaches: FloatArray,
+    widths: FloatArray,
     centre: FloatArray,
     turn_scale: float,
+    damping: float,
     hits: NDArray[np.int32],
     errors: FloatArray,
     sigmas: FloatArray,
@@ -175,8 +179,10 @@ def settle(
         pose: (12,) row of keyframe_from_frame.
         noise: (2,) terms of single depths.
         reaches: Of the matches in each round, as shares of the depth.
+        widths: Added to those of the biweight, likewise.
         centre: (3,) of the turns, in the keyframe's frame.
         turn_scale: Radians for a step of one.
+        damping: Of motions away from the pose as it is given, relative to the mean diagonal.
         hits: (H, W) filled by ``matches``,
         errors: likewise,
         sigmas: likewise.
@@ -184,18 +190,32 @@ def settle(
     Returns:
         The robust standard deviation of the errors in units of their own; NaN with few matches.
     """
-    h, g = np.empty((6, 6)), np.empty(6)
+    h, g, moved = np.empty((6, 6)), np.empty(6), np.zeros(6)
     far = np.sqrt((centre * centre).sum())
-    for reach in reaches:
-        matches(depth, planes, camera, pose, noise, reach, hits, errors, sigmas)
+    for k in range(len(reaches)):
+        matches(depth, planes, camera, pose, noise, reaches[k], hits, errors, sigmas)
         spread = spread_of_matches(hits, errors, sigmas)
         if not spread > 0.0:
             break
         accumulate(
-            depth, planes, camera, pose, hits, errors, sigmas, spread, centre, turn_scale, h, g
+            depth,
+            planes,
+            camera,
+            pose,
+            hits,
+            errors,
+            sigmas,
+            spread,
+            widths[k],
+            centre,
+            turn_scale,
+            h,
+            g,
         )
-        if not solve_damped(h, g, DAMPING):
+        g += damping * np.trace(h) / 6 * moved
+        if not solve_damped(h, g, damping):
             break
+        moved += g
         move(pose, g, centre, turn_scale)
         if np.sqrt((g * g).sum()) < SETTLED * far:
             break

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanweld.cut.smoothing import LEAST_NOISE, noise_of
+from scanweld.cut.smoothing import LEAST_NOISE, noise_of, uneven
 from scanweld.geometry.arrays import FloatArray
 
 
@@ -39,21 +39,11 @@ class DepthNoise:
 
 
 def depth_noise(images: Sequence[FloatArray]) -> DepthNoise:
-    """Noise of depth images (H, W), by how depths differ from the middle of their neighbours.
-
-    On a smooth surface only noise is left of that difference, and it has 3/2 of its variance.
-    Differences at jumps are many times larger; ``noise_of`` leaves out the largest.
-    """
-    off, depth, steps = [], [], []
-    for image in images:
-        middle, sides = image[:, 1:-1], (image[:, :-2], image[:, 2:])
-        difference = middle - 0.5 * (sides[0] + sides[1])
-        is_smooth = np.isfinite(difference)
-        off.append(difference[is_smooth] / np.sqrt(1.5))
-        depth.append(middle[is_smooth])
-        step = np.abs(np.diff(image, axis=1))
-        steps.append(step[step > 0])  # False where one is NaN
-    away, far, step = (np.concatenate(parts) for parts in (off, depth, steps))
+    """Noise of depth images (H, W), by how depths differ from the middle of their neighbours."""
+    off, depth = zip(*map(uneven, images), strict=True)
+    steps = [np.abs(np.diff(image, axis=1)) for image in images]
+    away, far = np.concatenate(off), np.concatenate(depth)
+    step = np.concatenate([each[each > 0] for each in steps])  # False where one is NaN
     if not len(away):
         return DepthNoise(constant=LEAST_NOISE, quadratic=0.0)
     # An even error within a step of the sensor; as often as not neighbours do not show it.
