@@ -99,7 +99,7 @@ class Evidence:
         return self.free_patch - limits.free
 
     def excess(self, limits: PatchLimits) -> float:
-        """The larger of both, weighted: what refuses a merge, while less makes its scans doubtful."""
+        """The larger of both, weighted: less than refuses a merge makes its scans doubtful."""
         return max(self.front_excess(limits), FREE_PATCH_WEIGHT * self.free_excess(limits))
 
     @property
