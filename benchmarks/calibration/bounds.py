@@ -11,7 +11,7 @@ from scanweld.geometry.arrays import BoolArray, FloatArray
 
 HELD = 0.95
 """Share of the scans for which both bounds hold."""
-QUANTILES = np.linspace(HELD, 0.995, 10)
+QUANTILES = tuple(np.linspace(HELD, 0.995, 10).tolist())
 """Of rotations and of translations alone; the first by which both hold is taken."""
 LEAST = 1e-9
 """Errors below this are of the scan that the others are held against: it has none."""
@@ -24,15 +24,18 @@ def learn_bounds(records: Sequence[Record]) -> Bounds:
     rotations, translations = (
         np.array([one[what] for one in told]).reshape(-1, 3) for what in ("rotation", "translation")
     )
-    for quantile in QUANTILES:
-        bounds = Bounds(
-            rotation=_scale(rotations, float(quantile)),
-            translation=_scale(translations, float(quantile)),
+
+    def at(quantile: float) -> Bounds:
+        return Bounds(
+            rotation=_scale(rotations, quantile), translation=_scale(translations, quantile)
         )
-        held = _holds(bounds.rotation, rotations) & _holds(bounds.translation, translations)
-        if len(held) == 0 or held.mean() >= HELD:
-            return bounds
-    return bounds
+
+    def held(bounds: Bounds) -> float:
+        both = _holds(bounds.rotation, rotations) & _holds(bounds.translation, translations)
+        return float(both.mean()) if len(both) else 1.0
+
+    *options, widest = QUANTILES
+    return next((bounds for bounds in map(at, options) if held(bounds) >= HELD), at(widest))
 
 
 def _holds(scale: BoundScale, told: FloatArray) -> BoolArray:

@@ -47,10 +47,10 @@ class Scene:
         return self.sensor
 
 
-Settle = Callable[[Poses, SensorModel | None], Poses]
-"""Refines the poses of a component as it grows, by what is known of the sensor."""
-Refine = Callable[[Poses, Sequence[Edge], Sequence[Edge], SensorModel], Refined]
-"""Refines the poses of a component, given its accepted and its compared pairs, and the sensor."""
+Settle = Callable[[SensorModel | None, Poses], Poses]
+"""Refines, by what is known of the sensor, the poses of a component as it grows."""
+Refine = Callable[[SensorModel, Poses, Sequence[Edge], Sequence[Edge]], Refined]
+"""Refines the poses of a component, given the sensor, its accepted and its compared pairs."""
 
 
 class Shortcuts(Protocol):

@@ -1,6 +1,7 @@
 """The problem that the view graph is built from, as users' facts let its pairs be used."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from scanweld.config import Config
 from scanweld.evidence.judge import Poses
@@ -41,7 +42,7 @@ def graph_problem(
         centres=judge.centres,
         same=same_pose(scene, config),
         judge=judge,
-        settle=lambda poses: method.settle(poses, scene.sensor),
+        settle=partial(method.settle, scene.sensor),
         config=config.graph,
         apart=known.apart,
         initial=components,

@@ -31,13 +31,13 @@ def published_method(scene: Scene, config: Config, workers: int) -> Method:
     del workers
     registrar = _PublishedRegistrar(config=config)
 
-    def stay(poses: Poses, sensor: SensorModel | None) -> Poses:
+    def stay(sensor: SensorModel | None, poses: Poses) -> Poses:
         """Unlike in the robust method nothing is refined while components grow."""
         del sensor
         return poses
 
     def refine(
-        poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge], sensor: SensorModel
+        sensor: SensorModel, poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge]
     ) -> Refined:
         del compared, sensor
         aligned = mm_icc(scene.intake.prepared, poses, accepted, config.contours)

@@ -24,13 +24,13 @@ def robust_method(scene: Scene, config: Config, workers: int) -> Method:
     registrar = PairRegistrar(config=config)
     settling = config.refine.model_copy(update={"num_rounds": NUM_SETTLING_ROUNDS})
 
-    def settle(poses: Poses, sensor: SensorModel | None) -> Poses:
+    def settle(sensor: SensorModel | None, poses: Poses) -> Poses:
         compared = partners(poses, scene.judge, workers)
         settings = _reaching(settling, sensor)
         return refined_poses(scans, poses, compared, settings, workers=workers)
 
     def refine(
-        poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge], sensor: SensorModel
+        sensor: SensorModel, poses: Poses, accepted: Sequence[Edge], compared: Sequence[Edge]
     ) -> Refined:
         del accepted
         settings = _reaching(config.refine, sensor)

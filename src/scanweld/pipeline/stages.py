@@ -98,8 +98,7 @@ def refine_placed(
     """
     prepared = scene.intake.prepared
     with stages.stage("refine") as counts:
-        refine = partial(method.refine, sensor=scene.known_sensor)
-        graph = refine_graph(graph, refine, scene.judge)
+        graph = refine_graph(graph, partial(method.refine, scene.known_sensor), scene.judge)
         doubts = find_doubts(graph, scene.judge)
         doubts = merged(_standing_doubts(scene, graph), doubts)
         if axis is not None:
