@@ -12,6 +12,7 @@ time of ``scanweld run`` as a process, of a stage those between its two events.
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -38,6 +39,8 @@ from scanweld.io import PoseSet, read_mesh, read_poses, read_scan
 MEASURED, RIVAL_SET = ("bunny10", "dragon15", "demo"), "bunny10"
 MANY, PIXELS, FIRST_OF_LARGE = (10, 20, 40, 80, 200), 300.0, 40
 """Numbers of virtual scans, their pixels, and from how many on the exponents of stages are."""
+ONE_MORE = (10, 40)
+"""Numbers of scans that are done when one more comes."""
 NUM_LOOPS = 320
 """About one CPU second at 2.4 GHz."""
 NUM_SMALL = 5
@@ -46,6 +49,7 @@ AFTER_POSES = ("fuse", "report", "rest")
 FLOORS = {
     **{"bunny10": 12.0, "dragon15": 16.0, "40": 60.0, "200": 600.0, "exponent": 1.3},
     **{"open3d": 8.0, "share": 0.6, "peak_mb": 3072.0, "help": 0.3, "info": 0.8, "first": 10.0},
+    **{"more10": 0.25, "more40": 0.1},
 }
 """In CPU seconds, of the first run and small commands in seconds of wall time."""
 
@@ -53,7 +57,8 @@ FLOORS = {
 def main() -> int:
     """Measure the parts that are asked for, and write the page."""
     parts: dict[str, Callable[[argparse.Namespace], Iterable[Json]]] = {
-        **{"clear": clear, "small": small, "first": first, "sets": sets, "many": many}
+        **{"clear": clear, "small": small, "first": first, "sets": sets, "many": many},
+        **{"more": more},
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=__doc__)
     add = add_options(parser, "--jobs", "speed").add_argument
@@ -92,10 +97,12 @@ def beside_loop(measure: Callable[[], Json]) -> Json:
     return {**found, "loop": mean((before, loop())), "load": os.getloadavg()[0]}
 
 
-def run_once(folder: Path, truth: Truth, workers: int = 1, **environment: str) -> Json:
+def run_once(
+    folder: Path, truth: Truth, workers: int = 1, out: Path | None = None, **environment: str
+) -> Json:
     """Run the main job on a folder of scans: CPU of its stages, memory, counts and errors."""
     with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
-        out = Path(temporary) / "model"
+        out = out or Path(temporary) / "model"
         command = scanweld_command("run", folder, "-o", out, "--workers", workers, "--json")
         start = time.perf_counter()
         process = subprocess.Popen(
@@ -182,6 +189,26 @@ def many(options: argparse.Namespace) -> Iterator[Json]:
             yield {"kind": "many", "name": str(number), **_measured(folder, truth_of(scans, poses))}
 
 
+def more(options: argparse.Namespace) -> Iterator[Json]:
+    """One more scan to some that are done, beside all of them at once."""
+    for number in () if options.quick else ONE_MORE:
+        mesh = read_mesh(data_folder(options.data) / "meshes/armadillo.ply")
+        with tempfile.TemporaryDirectory(prefix="scanweld-") as temporary:
+            folder, few, out = (Path(temporary) / name for name in ("scans", "few", "out"))
+            poses = simulate(mesh, folder, num_scans=number + 1, pixels=PIXELS).poses
+            paths = sorted(folder.glob("*.ply"))
+            scans = [read_scan(path) for path in paths]
+            few.mkdir()
+            for path in paths[:-1]:
+                shutil.copy(path, few)
+            whole = _measured(folder, truth_of(scans, poses))
+            first = {scan.name: poses[scan.name] for scan in scans[:-1]}
+            _measured(few, truth_of(scans[:-1], first), 1, out / "few")
+            added = _measured(folder, truth_of(scans, poses), 1, out / "more")
+            told = {key: _brief(run) for key, run in (("whole", whole), ("added", added))}
+            yield {"kind": "more", "name": str(number), **told, "stages": added["stages"]}
+
+
 def _measured(folder: Path, truth: Truth, *how: Any, **environment: str) -> Json:
     return beside_loop(lambda: run_once(folder, truth, *how, **environment))
 
@@ -257,7 +284,7 @@ def _slope(records: Sequence[Json], cost: Callable[[Json], float]) -> float:
 
 def page(document: Json) -> str:
     """The whole page; what was not measured is left out."""
-    kinds = {"set", "open3d", "many", "first", "small", "clear"}
+    kinds = {"set", "open3d", "many", "first", "small", "clear", "more"}
     of = {kind: [r for r in document["records"] if r["kind"] == kind] for kind in kinds}
     of["many"].sort(key=lambda record: record["scans"])
     stages = list(dict.fromkeys(s for r in (*of["set"], *of["many"]) for s in r["stages"]))
