@@ -29,6 +29,7 @@ from tests.videos import KINECT
 CAMERA, SIZE = pinhole(160), 0.2
 UNKNOWN, ONE_WAY = "where it stood is not known", "looked one way"
 NOT_ONE, NO_TABLE = "did not look at one place", "no table is seen"
+BESIDE = "no one thing stands where it looked"
 
 
 class Carried(NamedTuple):
@@ -62,11 +63,11 @@ def split(whole: TriangleMesh, body: TriangleMesh) -> tuple[TriangleMesh, Triang
 
 
 @lru_cache
-def carried(name: str, turn_deg: float = 280.0) -> Carried:
+def carried(name: str, turn_deg: float = 280.0, beside: float = 0.0) -> Carried:
     mesh = OBJECTS[name]()
     mesh = replace(mesh, vertices=mesh.vertices * [1.0, -1.0, -1.0])  # their z points down
     body, table = split(table_with(mesh, SIZE, 0.0), mesh)
-    middle = np.array([0.0, 0.0, 0.4 * SIZE])
+    middle = np.array([beside, 0.0, 0.4 * SIZE])
     way = around(middle, 0.5, np.linspace(0, turn_deg, 8), np.random.default_rng(1))
     walls = room(np.random.default_rng(0))
     below = replace(walls, vertices=walls.vertices - [0.0, 0.0, 0.75])
@@ -126,13 +127,14 @@ def without_table() -> Carried:
     return made._replace(scans=tuple(scans))
 
 
-@pytest.mark.parametrize("reason", [UNKNOWN, ONE_WAY, NOT_ONE, NO_TABLE])
+@pytest.mark.parametrize("reason", [UNKNOWN, ONE_WAY, NOT_ONE, NO_TABLE, BESIDE])
 def test_where_it_is_not_known_frames_stay_the_very_same_and_the_reason_is_told(reason: str):
     made = {
         UNKNOWN: lambda: carried("creature 0")._replace(stood=Stood(poses={}, components=[])),
         ONE_WAY: lambda: carried("creature 0", 10.0),
         NOT_ONE: nowhere,
         NO_TABLE: without_table,
+        BESIDE: lambda: carried("creature 0", beside=0.15),
     }[reason]()
     cut = cut_out(made.scans, "auto", made.stood)
     assert reason in cut.reason and cut.kept == {}

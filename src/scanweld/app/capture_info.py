@@ -135,6 +135,6 @@ def _object(
     shares = [100 * float(mask.mean()) for mask in kept.values()]
     told = f"{min(shares):.1f} to {max(shares):.1f} % of the pixels"
     return (
-        f"the camera stood still: {told} moved and would be kept, of {len(kept)} of {len(scans)} "
-        "frames; table and background would be cut off"
+        f"{told} show the object and would be kept, of {len(kept)} of {len(scans)} frames; table "
+        "and background would be cut off"
     )

@@ -11,6 +11,7 @@ from scanweld.cut.smoothing import Noise, noise_of, uneven
 from scanweld.cut.standing import Standing
 from scanweld.cut.table import Plane, above, supporting_planes
 from scanweld.geometry.arrays import FloatArray, IntArray
+from scanweld.geometry.camera import Camera
 from scanweld.geometry.pose import Pose
 
 MIN_AXES = 3
@@ -103,7 +104,7 @@ def looked_at(frames: Frames, meeting: Meeting) -> list[IntArray] | str:
     Each frame is cut by itself: its own table, bent as it bends it, goes; of the pieces that are
     left, the one about the meeting point stays.
     """
-    objects, tables = [], 0
+    objects, tables, about = [], 0, []
     away, far = zip(*(uneven(frames.depth(k)) for k in range(len(frames.scans))), strict=True)
     noise = noise_of(np.concatenate(away), np.concatenate(far))
     for k, scan in enumerate(frames.scans):
@@ -117,9 +118,20 @@ def looked_at(frames: Frames, meeting: Meeting) -> list[IntArray] | str:
         numbers = pieces_of(depth, is_above, noise, frames.camera)
         numbers = np.where(is_above, numbers, -1)
         objects.append(piece_around(place, radius, depth, numbers, frames.camera))
+        if len(objects[-1]):
+            about.append(_is_about(place, objects[-1], frames.camera))
     if 2 * tables <= len(objects):
         return "the camera moved, and no table is seen under what it looked at"
+    if np.mean(about or [False]) < MOST_AXES:
+        return "the camera moved, and no one thing stands where it looked"
     return objects
+
+
+def _is_about(place: FloatArray, pixels: IntArray, camera: Camera) -> bool:
+    """Whether the pixels of a piece lie on all sides of a place (3,)."""
+    (at,), _ = camera.project(place[None])
+    seen = np.stack([pixels % camera.width, pixels // camera.width], axis=1)
+    return bool((seen.min(axis=0) <= at).all() and (at <= seen.max(axis=0)).all())
 
 
 def _still(depth: FloatArray, noise: Noise) -> Standing:

@@ -42,14 +42,12 @@ class CutSet:
         kept: (H, W) cells of the grid that were kept, by the name of each scan that was cut.
         empty: Reason for each scan of which nothing is left, by name.
         reason: Why nothing was cut, if so.
-        is_carried: Whether the camera was carried around the object; else it stood still.
     """
 
     scans: tuple[RangeScan, ...]
     kept: Mapping[str, BoolArray] = field(default_factory=dict)
     empty: Mapping[str, str] = field(default_factory=dict)
     reason: str = ""
-    is_carried: bool = False
 
 
 def cut_out(scans: Sequence[RangeScan], shown: Shown, stood: Stood | None = None) -> CutSet:
