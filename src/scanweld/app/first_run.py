@@ -65,7 +65,7 @@ KERNELS = {
 VIDEO_KERNELS = {
     "video.levels._halved": "f8w2 f8 f8w1",
     "video.levels._planes": "f8w2 f8w1 i8 f8 f8w1",
-    "video.match.settle": "f8w2 f8w3 f8w1 f8w1 f8w1 f8w1 f8w1 f8 i4w2 f8w2 f8w2",
+    "video.match.settle": "f8w2 f8w3 f8w1 f8w1 f8w1 f8w1 f8w1 f8w1 f8 f8 i4w2 f8w2 f8w2",
     "video.average._add": "f8w2 f8w3 f8w1 f8w1 f8w1 f8 f8w2 f8w2 i4w2 i4w2",
 }
 """What the run of a video calls before all others."""
