@@ -8,7 +8,8 @@ import pytest
 
 from scanweld.app.model_folder import open_model
 from scanweld.app.outputs import write_outputs
-from scanweld.evidence.evidence import PatchLimits
+from scanweld.evidence.evidence import Evidence, PatchLimits
+from scanweld.geometry.pose import Pose
 from scanweld.graph.doubts import Doubt, DoubtCode, doubt_of, merged
 from scanweld.graph.reasons import find_doubts
 from scanweld.graph.view_graph import Component
@@ -48,20 +49,29 @@ def test_all_doubts_about_a_scan_are_kept_and_the_weightiest_comes_first():
     assert set(doubts) == {1, 2} and merged() == {}
 
 
-@pytest.mark.parametrize("agree", [0.5, 0.0])
-def test_a_scan_that_nothing_holds_and_others_see_through_is_doubted_for_both(agree: float):
-    world = world_of(2)
+@pytest.mark.parametrize("through", [(), ((0, 1),), ((0, 1), (1, 2))])
+def test_a_part_that_two_pairs_see_through_is_doubted_and_a_shadow_in_one_is_not(
+    through: tuple[tuple[int, int], ...],
+):
+    world = world_of(3)
     graph = graph_with({}, Component(poses=dict(enumerate(world)), reference=0))
     known = doubt_of(DoubtCode.NOT_REFINED, {0: "pulled apart"})
     graph = replace(graph, doubts=known)
-    judge = DrawnJudge(
-        says=lambda i, j, pose: replace(seen(agree), free_patch=0.5 - agree), limits=LIMITS
-    )
+
+    def says(i: int, j: int, i_from_j: Pose) -> Evidence:
+        is_through = (min(i, j), max(i, j)) in through
+        return replace(seen(0.0), free_patch=LIMITS.free + 0.02 * is_through)
+
     codes = {
-        k: [doubt.code.value for doubt in doubts] for k, doubts in find_doubts(graph, judge).items()
+        k: [doubt.code.value for doubt in doubts]
+        for k, doubts in find_doubts(graph, DrawnJudge(says=says, limits=LIMITS)).items()
     }
-    through = [] if agree else ["violated"]
-    assert codes == {0: [*through, "unpaired", "not_refined"], 1: [*through, "unpaired"]}
+    violated = ["violated"] if len(through) > 1 else []
+    assert codes == {
+        0: [*violated, "unpaired", "not_refined"],
+        1: [*violated, "unpaired"],
+        2: [*violated, "unpaired"],
+    }
 
 
 def test_doubts_are_written_and_read_back(tmp_path: Path):

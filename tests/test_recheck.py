@@ -1,6 +1,9 @@
 """Merges that fail at first sight: once all scans have settled, beside others."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
 
 from scanweld.evidence.evidence import Evidence
 from scanweld.geometry.pose import Pose
@@ -10,6 +13,7 @@ from scanweld.graph.proposals import Proposal
 from scanweld.graph.view_graph import ViewGraph
 from scanweld.pairs.result import PairKind
 from tests.view_graphs import (
+    USUAL_LIMITS,
     DrawnJudge,
     Say,
     exact_pairs,
@@ -108,3 +112,20 @@ def test_a_right_pair_that_came_too_early_comes_in_late():
     graph = graph_of(world, pairs, judge_of(world, pairs, denied=seen(0.0)))
     assert scans_of(only_component(graph, world)) == {0, 1, 2, 3}
     assert {(0, 1), (1, 2), (2, 3)} <= set(graph.accepted)
+
+
+@pytest.mark.parametrize("through", [(), ((0, 2),), ((0, 2), (0, 3))])
+def test_a_merge_is_refused_where_two_pairs_see_through_a_part(
+    through: tuple[tuple[int, int], ...],
+):
+    """0 and 1 hang together, so do 2 and 3, and 1-2 is good."""
+    world = world_of(4)
+    pairs = exact_pairs([(0, 1), (1, 2), (2, 3)], world, {(1, 2): 0.3})
+
+    def says(i: int, j: int, i_from_j: Pose) -> Evidence:
+        edge = min(i, j), max(i, j)
+        told = seen(0.9 if edge in ((0, 1), (2, 3)) else 0.3)
+        return replace(told, free_patch=USUAL_LIMITS.free + 0.1 * (edge in through))
+
+    graph = build_view_graph(problem_of(4, pairs, DrawnJudge(says=says)))
+    assert len(graph.components) == 1 + (len(through) > 1)

@@ -9,7 +9,6 @@ import pytest
 
 from scanweld.confidence.bounds import Bounds, BoundScale
 from scanweld.config import PrepareConfig
-from scanweld.evidence.evidence import MAX_EXCESS
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
 from scanweld.evidence.sample_patches import violating_patches
 from scanweld.geometry.arrays import FloatArray
@@ -162,10 +161,9 @@ def test_patches_in_free_space_are_held_to_what_certain_pairs_show(
         learnt(pair, *results)
         for results in ((result, result), (result, certain), (replace(result, margin=0.3),))
     )
-    assert through.excess(honest.limits) > MAX_EXCESS
-    assert through.excess(trimmed.limits) <= MAX_EXCESS and trimmed.max_free_patch == 0.1
-    assert through.free_excess(trimmed.limits) > MAX_EXCESS, "placed, and doubted"
-    assert through.excess(unknown.limits) <= 0.0, "without certain pairs nothing is known"
+    assert through.free_excess(honest.limits) > 0.1
+    assert through.free_excess(trimmed.limits) == pytest.approx(0.05)
+    assert through.free_excess(unknown.limits) <= 0.0, "without certain pairs nothing is known"
 
 
 @pytest.mark.parametrize("num_scans", [4, 6])

@@ -1,5 +1,6 @@
 """The record of visibility evidence on a relative pose, and its score."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 VIOLATION_WEIGHT = 3.0
@@ -20,6 +21,16 @@ NO_LIMIT = 1.0
 """Of patches in free space, where a set does not tell how far its silhouettes can be believed."""
 MIN_AGREE = 0.05
 """Share of agreeing samples below which two scans do not overlap."""
+
+
+def seen_twice(excesses: Iterable[float]) -> float:
+    """By how much at least two pairs exceed what a set excuses.
+
+    A sensor that lost a part of the surface, in a shadow or on a dark spot, looked past it in one
+    scan alone; what moved is missing where any scan looks for it.
+    """
+    largest = sorted(excesses)[-2:]
+    return largest[0] if len(largest) == 2 else -NO_LIMIT
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -97,10 +108,6 @@ class Evidence:
         cut: these are held to what is seen there at poses that surfaces make sure.
         """
         return self.free_patch - limits.free
-
-    def excess(self, limits: PatchLimits) -> float:
-        """The larger of both, weighted: less than refuses a merge makes its scans doubtful."""
-        return max(self.front_excess(limits), FREE_PATCH_WEIGHT * self.free_excess(limits))
 
     @property
     def surface_violation(self) -> float:

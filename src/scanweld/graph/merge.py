@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from scanweld.evidence.evidence import MAX_EXCESS, VIOLATION_WEIGHT, Evidence
+from scanweld.evidence.evidence import MAX_EXCESS, VIOLATION_WEIGHT, Evidence, seen_twice
 from scanweld.evidence.judge import PairJudge, Poses
 from scanweld.evidence.patches import PixelConsensus, is_refuted_jointly, violates_free_space
 from scanweld.evidence.rivals import margin_over
@@ -32,7 +32,8 @@ class Merge:
         agree: Sum over the pairs across of the shares of samples that agree,
         violated: that lie before the other's surface or contradict it,
         free: that lie in the other's free space.
-        worst: Largest excess of violating patches over agreement of any single pair across.
+        worst: Largest excess of patches before surfaces of any single pair across, or of patches in
+            free space of any two, over what the set excuses.
         margin: Share of the score by which it beats its best distinct rival.
     """
 
@@ -213,5 +214,8 @@ def _summed(
         agree=sum(e.agree for e in evidence),
         violated=sum(violated),
         free=sum(e.free for e in evidence),
-        worst=max(e.excess(judge.limits) for e in evidence),
+        worst=max(
+            *(e.front_excess(judge.limits) for e in evidence),
+            seen_twice(e.free_excess(judge.limits) for e in evidence),
+        ),
     )

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from scanweld.evidence.evidence import MAX_EXCESS
+from scanweld.evidence.evidence import MAX_EXCESS, Evidence, seen_twice
 from scanweld.evidence.judge import PairJudge
 from scanweld.evidence.slippage import Slide, slide_words
 from scanweld.geometry.arrays import FloatArray
@@ -19,6 +19,8 @@ Said = TypeVar("Said")
 
 MIN_ALIKE = 2
 """So many pairs, more than half of their kind, must say the same of the object to be quoted."""
+EACH_EXCESS = 0.5 * MAX_EXCESS
+"""The same of each of two pairs that show a part in free space: together they come to as much."""
 OUTWEIGHED = 2.0
 """Accepted pairs outweigh a good one that disagrees if their scores sum to so many times its."""
 
@@ -164,16 +166,28 @@ def _unexplained(
     Before the surface that another sensor saw, and in its free space.
     """
     poses = component.poses
-    in_front: dict[int, float] = {}
-    in_free_space: dict[int, float] = {}
-    for i, j in graph.compared(component):
-        told = judge.pair(i, j, poses[i].inverse() @ poses[j])
-        for k in (i, j):
-            if told.front_excess(judge.limits) > MAX_EXCESS:
-                in_front[k] = max(in_front.get(k, 0.0), told.front_patch)
-            if told.free_excess(judge.limits) > MAX_EXCESS:
-                in_free_space[k] = max(in_free_space.get(k, 0.0), told.free_patch)
-    return in_front, in_free_space
+    told = {
+        (i, j): judge.pair(i, j, poses[i].inverse() @ poses[j])
+        for i, j in graph.compared(component)
+    }
+    limits = judge.limits
+    in_front = {e: said for e, said in told.items() if said.front_excess(limits) > MAX_EXCESS}
+    in_free_space: dict[Edge, Evidence] = {}
+    if seen_twice(said.free_excess(limits) for said in told.values()) > EACH_EXCESS:
+        in_free_space = {e: d for e, d in told.items() if d.free_excess(limits) > EACH_EXCESS}
+    return (
+        _largest({edge: said.front_patch for edge, said in in_front.items()}),
+        _largest({edge: said.free_patch for edge, said in in_free_space.items()}),
+    )
+
+
+def _largest(of_pairs: Mapping[Edge, float]) -> dict[int, float]:
+    """The largest of each scan's pairs."""
+    found: dict[int, float] = {}
+    for edge, value in of_pairs.items():
+        for k in edge:
+            found[k] = max(found.get(k, 0.0), value)
+    return found
 
 
 def _good_but_rejected(graph: ViewGraph) -> list[Edge]:
