@@ -10,6 +10,7 @@ import pytest
 from scanweld.confidence.bounds import Bounds, BoundScale
 from scanweld.config import PrepareConfig
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
+from scanweld.evidence.rivals import RIVAL_ANGLE_DEG
 from scanweld.evidence.sample_patches import violating_patches
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose import Pose
@@ -250,7 +251,7 @@ def test_bounds_grow_with_the_deviation_and_with_the_distance_of_surfaces():
     assert bound(0.8, 0.1).shift > bound(0.4, 0.1).shift
     assert bound(0.4, 0.4).angle_deg == pytest.approx(2 * bound(0.4, 0.1).angle_deg)
     assert bound(0.4, 0.1, 1000.0).shift == pytest.approx(1000 * bound(0.4, 0.1).shift)
-    assert bound(1e9, 50.0) == PoseTolerance(angle_deg=180.0, shift=100.0)
+    assert bound(1e9, 50.0) == PoseTolerance(angle_deg=RIVAL_ANGLE_DEG, shift=6.0)
 
 
 def test_a_splat_lies_on_a_tilted_plane_wherever_its_points_fall():

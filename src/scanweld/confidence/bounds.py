@@ -10,11 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
 from scanweld.geometry.gauss_newton import lever_arm
 from scanweld.geometry.pose_tolerance import PoseTolerance
-
-FULL_TURN_DEG = 180.0
-"""Bound of a turn that nothing determines."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -48,7 +46,9 @@ class Bounds:
     def of(
         self, deviations: Mapping[int, PoseTolerance], sigma: float, diameter: float
     ) -> dict[int, PoseTolerance]:
-        """Bounds at 95 % of the error of each pose.
+        """Bounds at 95 % of the error of each pose, if it is the right one.
+
+        Farther off than rivals are apart it would be another pose: no bound says more.
 
         Args:
             deviations: Standard deviations of the poses.
@@ -61,6 +61,7 @@ class Bounds:
             angle = float(np.degrees(self.rotation.bound(one.angle, turn)))
             shift = self.translation.bound(one.shift / diameter, sigma / diameter)
             bounds[k] = PoseTolerance(
-                angle_deg=min(angle, FULL_TURN_DEG), shift=min(shift, 1.0) * diameter
+                angle_deg=min(angle, RIVAL_ANGLE_DEG),
+                shift=min(shift, RIVAL_SHIFT_DIAMETERS) * diameter,
             )
         return bounds
