@@ -21,7 +21,7 @@ from scanweld.pairs.quick import search_quickly
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION, held_to
 from scanweld.preparation.range_image import make_range_image, natural_pixel
-from scanweld.sensor.closure import closure_displacement
+from scanweld.sensor.closure import NO_CYCLES, Closure, closure_of
 from scanweld.sensor.learn import learn_sensor
 from scanweld.sensor.model import SensorModel
 from scanweld.sensor.standing import moved_share, standing_scans
@@ -182,14 +182,14 @@ def test_cycles_tell_how_far_pairs_are_off(found: tuple[PreparedPair, PairResult
             off[0] += wrong * diameter * (n == 0)
             best = replace(result.alternatives[0], i_from_j=Pose.exp([0, 0, 0, *off]))
             pairs[i, j] = replace(result, i=i, j=j, alternatives=(best,))
-        return closure_displacement(pairs, fields, diameter) / diameter
+        return closure_of(pairs, fields, diameter).displacement / diameter
 
     assert closed(0.0) == 0.0
     assert closed(0.01) == pytest.approx(0.01, rel=0.6)
     assert closed(0.02) == pytest.approx(2.0 * closed(0.01))
     assert closed(0.001, wrong=0.5) < 0.003
     alone = {(0, 1): result, (1, 2): replace(result, i=1, j=2), (0, 2): replace(result, i=0, j=2)}
-    assert closure_displacement(alone, fields, diameter) == 0.0, "one cycle closes by chance"
+    assert closure_of(alone, fields, diameter) == NO_CYCLES, "one cycle closes by chance"
 
 
 def test_bent_depth_that_pairs_hide_widens_what_is_compared(
@@ -197,10 +197,15 @@ def test_bent_depth_that_pairs_hide_widens_what_is_compared(
 ):
     pair, result = found
     sensor = learnt(pair, result, result)
-    open_cycles = lambda pairs, fields, diameter: 0.01 * diameter  # noqa: E731
-    monkeypatch.setattr("scanweld.sensor.learn.closure_displacement", open_cycles)
+
+    def open_cycles(pairs: object, fields: object, diameter: float) -> Closure:
+        return Closure(displacement=0.01 * diameter, num_cycles=2)
+
+    monkeypatch.setattr("scanweld.sensor.learn.closure_of", open_cycles)
     bent = learnt(pair, result, result)
-    assert bent.sigma > 0.005 * pair.diameter and bent.correlated > sensor.correlated
+    assert bent.sigma > 0.005 * pair.diameter and bent.correlated == sensor.correlated
+    assert 0.005 * pair.diameter < bent.misclosure < 0.01 * pair.diameter
+    assert 0 < sensor.misclosure < 0.005 * pair.diameter, "usual, where no cycle closes"
     assert "around cycles" in bent.words() and "around cycles" not in sensor.words()
     assert sensor.tolerance < bent.tolerance <= 0.03 * pair.diameter + 1e-9
     assert bent.reach > 2.0 * sensor.reach

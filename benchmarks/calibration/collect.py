@@ -19,6 +19,7 @@ from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet
 from scanweld.pipeline.run import run
 from scanweld.reconstruction import Reconstruction
+from scanweld.sensor.model import SensorModel
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
 """The defaults; nobody looks at the model."""
@@ -57,7 +58,19 @@ class Sets(Kept):
             if pair.i_from_j is not None
         ]
         scans = _with_errors(_scans(found, scene), found, scene)
-        return {"pairs": pairs, "scans": scans}
+        return {"pairs": pairs, "scans": scans, "sensor": _told(found.sensor)}
+
+
+def _told(sensor: SensorModel | None) -> Result:
+    """What a set says of its sensor, lengths as shares of the diameter."""
+    if sensor is None:
+        return {}
+    lengths = {
+        **{"sigma": sensor.sigma, "white": sensor.white, "correlated": sensor.correlated},
+        **{"closure": sensor.closure.displacement, "misclosure": sensor.misclosure},
+    }
+    shares = {name: length / sensor.diameter for name, length in lengths.items()}
+    return {**shares, "certain": sensor.num_certain, "cycles": sensor.closure.num_cycles}
 
 
 def _is_right(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool | None:

@@ -73,23 +73,60 @@ def _covariance(
     diameter = sensor.diameter
     size, arm = 6 * len(order), lever_arm(diameter)
     normal = np.zeros((size, size))
-    for i, j, matches in found:
-        points = poses[j].apply(matches.points)
-        directions = poses[j].turn(matches.directions)
-        weights = _weights(points, sensor, PATCH_DIAMETERS * diameter)[:, None]
-        by_i = jacobian(points, directions, middles[i], arm)
-        by_j = -jacobian(points, directions, middles[j], arm)
+    for (i, j), ways in _by_pair(found).items():
+        between = 0.5 * (middles[i] + middles[j])
+        firmness = _firmness(ways, poses, between, sensor)
+        by_i, by_j = (_carried(middles[k] - between, arm) for k in (i, j))
         a, b = place[i], place[j]
-        normal[a, a] += (weights * by_i).T @ by_i
-        normal[b, b] += (weights * by_j).T @ by_j
-        cross = (weights * by_i).T @ by_j
-        normal[a, b] += cross
-        normal[b, a] += cross.T
+        normal[a, a] += by_i.T @ firmness @ by_i
+        normal[b, b] += by_j.T @ firmness @ by_j
+        cross = by_i.T @ firmness @ by_j
+        normal[a, b] -= cross
+        normal[b, a] -= cross.T
     free = _without_common_motion(order, middles, arm)
     inner = free.T @ normal @ free
     # What nothing holds may be off by a diameter.
     inner += np.eye(len(inner)) / diameter**2
     return free @ np.linalg.inv(inner) @ free.T
+
+
+def _by_pair(
+    found: Sequence[tuple[int, int, Matches]],
+) -> dict[tuple[int, int], list[tuple[int, Matches]]]:
+    """Matches of both ways of each pair (i, j), i < j, each with the scan that it is matched to."""
+    pairs: dict[tuple[int, int], list[tuple[int, Matches]]] = {}
+    for i, j, matches in found:
+        pairs.setdefault((min(i, j), max(i, j)), []).append((j, matches))
+    return dict(sorted(pairs.items()))
+
+
+def _firmness(
+    ways: Sequence[tuple[int, Matches]],
+    poses: Mapping[int, Pose],
+    centre: FloatArray,
+    sensor: SensorModel,
+) -> FloatArray:
+    """Inverse covariance (6, 6) of the twist between two scans, about a centre.
+
+    However many points they share, bent depth leaves the pose as far off as cycles of pairs do
+    not close, alike in all six directions: that covariance is added to the points'.
+    """
+    diameter, information = sensor.diameter, np.zeros((6, 6))
+    for j, matches in ways:
+        points, directions = poses[j].apply(matches.points), poses[j].turn(matches.directions)
+        weights = _weights(points, sensor, PATCH_DIAMETERS * diameter)[:, None]
+        moves = jacobian(points, directions, centre, lever_arm(diameter))
+        information += (weights * moves).T @ moves
+    firm, directions = np.linalg.eigh(information)
+    firm = np.maximum(firm, 0.0)
+    return (directions * (firm / (1.0 + firm * sensor.misclosure**2 / 6.0))) @ directions.T
+
+
+def _carried(away: FloatArray, arm: float) -> FloatArray:
+    """(6, 6) from the twist of a scan about its middle, (3,) from a centre, to that about this."""
+    carried = np.eye(6)
+    carried[3:, :3] = _cross(away) / arm
+    return carried
 
 
 def _weights(points: FloatArray, sensor: SensorModel, patch: float) -> FloatArray:
@@ -106,12 +143,8 @@ def _without_common_motion(
     order: Sequence[int], middles: Mapping[int, FloatArray], arm: float
 ) -> FloatArray:
     """Orthonormal basis (6 N, 6 N - 6) of twists that do not move the component as a whole."""
-    common = np.zeros((6 * len(order), 6))
     centre = np.mean([middles[k] for k in order], axis=0)
-    for n, k in enumerate(order):
-        common[6 * n : 6 * n + 3, :3] = np.eye(3)
-        common[6 * n + 3 : 6 * n + 6, :3] = -_cross(middles[k] - centre) / arm
-        common[6 * n + 3 : 6 * n + 6, 3:] = np.eye(3)
+    common = np.vstack([_carried(centre - middles[k], arm) for k in order])
     basis, _, _ = np.linalg.svd(common, full_matrices=True)
     return basis[:, 6:]
 

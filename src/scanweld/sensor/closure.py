@@ -6,6 +6,7 @@ is left open is by how much surfaces lie apart once all scans have one pose each
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.csgraph import shortest_path
@@ -21,15 +22,32 @@ MIN_CYCLES = 2
 """One cycle may close, or not, by chance."""
 
 
-def closure_displacement(
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Closure:
+    """How far cycles of pairs do not close.
+
+    Attributes:
+        displacement: Root mean square distance by which one pair moves a scan's samples amiss, in
+            the scans' unit.
+        num_cycles: Cycles that tell it.
+    """
+
+    displacement: float
+    num_cycles: int
+
+
+NO_CYCLES = Closure(displacement=0.0, num_cycles=0)
+
+
+def closure_of(
     pairs: Mapping[Edge, PairResult], fields: Sequence[ScanField], diameter: float
-) -> float:
-    """Root mean square distance by which one pair moves a scan's samples amiss, in scans' units.
+) -> Closure:
+    """How far one pair moves a scan's samples amiss, as cycles of pairs show it.
 
     Good pairs make a tree, the strongest first; every other good pair closes a cycle of it, and
     errors of the pairs around a cycle add up like independent ones. The median over the cycles
     that close: where a pair moves samples as far as rival poses are apart, some pair is wrong.
-    0 of fewer than two cycles.
+    Fewer than two cycles tell nothing.
 
     Args:
         pairs: All pairs, judged.
@@ -53,7 +71,9 @@ def closure_displacement(
         length = np.sqrt(1.0 + steps[pair.i, pair.j])
         if (each := float(np.sqrt(np.mean(moved**2))) / length) < most:
             found.append(each)
-    return float(np.median(found)) if len(found) >= MIN_CYCLES else 0.0
+    if len(found) < MIN_CYCLES:
+        return NO_CYCLES
+    return Closure(displacement=float(np.median(found)), num_cycles=len(found))
 
 
 def _strongest_tree(

@@ -16,7 +16,7 @@ from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.certain import Edge, certain_pairs
-from scanweld.sensor.closure import closure_displacement
+from scanweld.sensor.closure import closure_of
 from scanweld.sensor.model import NUM_SPREAD_BINS, SPREAD_SIGMAS, SensorModel
 
 MIN_CERTAIN = 2
@@ -67,9 +67,9 @@ def learn_sensor(
         )
     sigma = MAD_TO_SIGMA * float(np.median(np.abs(residuals)))
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
-    closure = closure_displacement(pairs, fields, diameter)
-    across = closure / np.sqrt(3.0)  # of a displacement that prefers no direction
-    sigma, correlated = float(np.hypot(sigma, across)), float(np.hypot(correlated, across))
+    closure = closure_of(pairs, fields, diameter)
+    across = closure.displacement / np.sqrt(3.0)  # of a displacement that prefers no direction
+    sigma = float(np.hypot(sigma, across))
     limit, most_free = usual_contradiction, NO_LIMIT
     if len(certain) >= MIN_CERTAIN:
         shown = [pair.alternatives[0].evidence for pair in certain]

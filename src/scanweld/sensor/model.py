@@ -1,9 +1,11 @@
 """What a set of scans says about its sensor, in numbers and in words."""
 
+import math
 from dataclasses import dataclass
 
 from scanweld.evidence.evidence import NO_LIMIT, PatchLimits
 from scanweld.geometry.gauss_newton import NEARLY_ALL_SIGMAS
+from scanweld.sensor.closure import NO_CYCLES, Closure
 
 MARGIN = (
     "empty pixels nearer than {:.1%} to the border of what a scan shows say nothing: right poses "
@@ -13,6 +15,10 @@ CLOSURE = (
     "around cycles poses of pairs miss each other by {:.1%} each, as where depth is bent over "
     "whole scans"
 )
+USUAL_MISCLOSURE, USUAL_CYCLES = 2.0, 2
+"""How far a pair moves a scan amiss as a rule, over the distance between surfaces that coincide
+(median of the sets of the calibration in which cycles close), and as how many cycles that counts
+beside those of the set."""
 SPREAD_SIGMAS, NUM_SPREAD_BINS = 5.0, 41
 """How far the spread of the distances is told, in standard deviations, and in how many bins."""
 
@@ -29,8 +35,8 @@ class SensorModel:
             each scan having one pose.
         white: The part of it that neighbouring points do not share: the sensor's noise.
         correlated: The part that they share: bent depth, a scale that is a little off.
-        closure: How far one pair's pose moves a scan amiss, seen where cycles of pairs close; the
-            correlated part and the whole contain what surfaces lie apart by it.
+        closure: How far cycles of pairs do not close; the whole contains what surfaces lie apart
+            by it.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
         diameter: Of the run.
@@ -50,7 +56,7 @@ class SensorModel:
     max_contradiction: float
     diameter: float
     max_free_patch: float = NO_LIMIT
-    closure: float = 0.0
+    closure: Closure = NO_CYCLES
     margin: float = 0.0
     spread: tuple[int, ...] = ()
 
@@ -65,9 +71,20 @@ class SensorModel:
         return PatchLimits(contradiction=self.max_contradiction, free=self.max_free_patch)
 
     @property
+    def misclosure(self) -> float:
+        """How far the pose of one pair moves a scan amiss, in the scans' unit.
+
+        What cycles show, and what is usual of such surfaces beside it: the fewer cycles, the more.
+        """
+        usual = USUAL_MISCLOSURE * math.hypot(self.white, self.correlated)
+        seen = self.closure.num_cycles
+        squares = USUAL_CYCLES * usual**2 + seen * self.closure.displacement**2
+        return math.sqrt(squares / (USUAL_CYCLES + seen))
+
+    @property
     def _misses(self) -> bool:
         """Whether cycles stay more open than noise leaves them."""
-        return self.closure > self.white
+        return self.closure.displacement > self.white
 
     def words(self) -> str:
         """The same in a sentence."""
@@ -79,6 +96,6 @@ class SensorModel:
             f"from {pairs}: surfaces lie {self.sigma / diameter:.2%} of the diameter apart "
             f"({self.white / diameter:.2%} noise, {self.correlated / diameter:.2%} shared by "
             f"neighbours); depth is compared to within {self.tolerance / diameter:.1%}"
-            + (f"; {CLOSURE.format(self.closure / diameter)}" if self._misses else "")
+            + (f"; {CLOSURE.format(self.closure.displacement / diameter)}" if self._misses else "")
             + (f"; {MARGIN.format(self.margin / diameter)}" if self.margin else "")
         )
