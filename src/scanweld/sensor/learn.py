@@ -29,6 +29,8 @@ MAX_TOLERANCE_DIAMETERS = 0.03
 """but not more than this: what lies farther apart is another place."""
 USUAL_SPREAD = 0.75
 """Quantile of the contradiction of certain pairs that is added to the usual limit."""
+OUTER_FENCE = 3.0
+"""Interquartile ranges above the upper quartile beyond which a value is far out (Tukey 1977)."""
 PATCH_DIAMETERS = 0.06
 """Edge of the cells within which residuals are averaged to find what neighbours share."""
 PRIOR_SIGMA_DIAMETERS = 0.002
@@ -74,7 +76,7 @@ def learn_sensor(
     if len(certain) >= MIN_CERTAIN:
         shown = [pair.alternatives[0].evidence for pair in certain]
         limit += float(np.quantile([told.contradiction for told in shown], USUAL_SPREAD))
-        most_free = max(told.free_patch for told in shown)
+        most_free = _most_of_usual([told.free_patch for told in shown])
     return SensorModel(
         num_certain=len(certain),
         sigma=sigma,
@@ -89,6 +91,15 @@ def learn_sensor(
         closure=closure,
         spread=_spread(residuals, sigma),
     )
+
+
+def _most_of_usual(values: Sequence[float]) -> float:
+    """The largest value that is not far out of the others (Tukey's outer fence).
+
+    Where a part moved, it is missing from a few certain pairs too, though from most it is not.
+    """
+    low, high = np.quantile(values, (0.25, 0.75))
+    return float(min(max(values), high + OUTER_FENCE * (high - low)))
 
 
 def _spread(residuals: FloatArray, sigma: float) -> tuple[int, ...]:
