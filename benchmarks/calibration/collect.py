@@ -67,10 +67,10 @@ def _told(sensor: SensorModel | None) -> Result:
         return {}
     lengths = {
         **{"sigma": sensor.sigma, "white": sensor.white, "correlated": sensor.correlated},
-        **{"closure": sensor.closure.displacement, "misclosure": sensor.misclosure},
+        **{"closure": sensor.closure, "misclosure": sensor.misclosure},
     }
     shares = {name: length / sensor.diameter for name, length in lengths.items()}
-    return {**shares, "certain": sensor.num_certain, "cycles": sensor.closure.num_cycles}
+    return {**shares, "certain": sensor.num_certain, "cycles": sensor.num_cycles}
 
 
 def _is_right(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool | None:

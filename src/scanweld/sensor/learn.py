@@ -88,7 +88,8 @@ def learn_sensor(
         max_contradiction=min(limit, MAX_CONTRADICTION),
         diameter=diameter,
         max_free_patch=most_free,
-        closure=closure,
+        closure=closure.displacement,
+        num_cycles=closure.num_cycles,
         spread=_spread(residuals, sigma),
     )
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from scanweld.evidence.evidence import NO_LIMIT, PatchLimits
 from scanweld.geometry.gauss_newton import NEARLY_ALL_SIGMAS
-from scanweld.sensor.closure import NO_CYCLES, Closure
 
 MARGIN = (
     "empty pixels nearer than {:.1%} to the border of what a scan shows say nothing: right poses "
@@ -35,8 +34,9 @@ class SensorModel:
             each scan having one pose.
         white: The part of it that neighbouring points do not share: the sensor's noise.
         correlated: The part that they share: bent depth, a scale that is a little off.
-        closure: How far cycles of pairs do not close; the whole contains what surfaces lie apart
-            by it.
+        closure: How far one pair's pose moves a scan amiss, seen where cycles of pairs do not close;
+            the whole contains what surfaces lie apart by it.
+        num_cycles: Cycles that tell it.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
         diameter: Of the run.
@@ -56,7 +56,8 @@ class SensorModel:
     max_contradiction: float
     diameter: float
     max_free_patch: float = NO_LIMIT
-    closure: Closure = NO_CYCLES
+    closure: float = 0.0
+    num_cycles: int = 0
     margin: float = 0.0
     spread: tuple[int, ...] = ()
 
@@ -77,14 +78,13 @@ class SensorModel:
         What cycles show, and what is usual of such surfaces beside it: the fewer cycles, the more.
         """
         usual = USUAL_MISCLOSURE * math.hypot(self.white, self.correlated)
-        seen = self.closure.num_cycles
-        squares = USUAL_CYCLES * usual**2 + seen * self.closure.displacement**2
-        return math.sqrt(squares / (USUAL_CYCLES + seen))
+        squares = USUAL_CYCLES * usual**2 + self.num_cycles * self.closure**2
+        return math.sqrt(squares / (USUAL_CYCLES + self.num_cycles))
 
     @property
     def _misses(self) -> bool:
         """Whether cycles stay more open than noise leaves them."""
-        return self.closure.displacement > self.white
+        return self.closure > self.white
 
     def words(self) -> str:
         """The same in a sentence."""
@@ -96,6 +96,6 @@ class SensorModel:
             f"from {pairs}: surfaces lie {self.sigma / diameter:.2%} of the diameter apart "
             f"({self.white / diameter:.2%} noise, {self.correlated / diameter:.2%} shared by "
             f"neighbours); depth is compared to within {self.tolerance / diameter:.1%}"
-            + (f"; {CLOSURE.format(self.closure.displacement / diameter)}" if self._misses else "")
+            + (f"; {CLOSURE.format(self.closure / diameter)}" if self._misses else "")
             + (f"; {MARGIN.format(self.margin / diameter)}" if self.margin else "")
         )
