@@ -34,7 +34,7 @@ class SensorModel:
             each scan having one pose.
         white: The part of it that neighbouring points do not share: the sensor's noise.
         correlated: The part that they share: bent depth, a scale that is a little off.
-        closure: How far one pair's pose moves a scan amiss, seen where cycles of pairs do not close;
+        closure: How far one pair's pose moves a scan amiss, seen where cycles of pairs stay open;
             the whole contains what surfaces lie apart by it.
         num_cycles: Cycles that tell it.
         tolerance: Depth tolerance by which poses are judged.
