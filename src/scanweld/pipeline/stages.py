@@ -20,7 +20,7 @@ from scanweld.graph.assemble import build_view_graph
 from scanweld.graph.doubts import DoubtCode, Doubts, doubt_of, merged
 from scanweld.graph.reasons import best_first, doubt_alone, find_doubts
 from scanweld.graph.refine_graph import refine_graph
-from scanweld.graph.view_graph import Component, ViewGraph
+from scanweld.graph.view_graph import ViewGraph
 from scanweld.knowledge import check
 from scanweld.knowledge.turntable import Turntable, off_axis_doubts
 from scanweld.knowledge.usable_pairs import with_found_pairs
@@ -29,7 +29,7 @@ from scanweld.pipeline.method import Method, Scene
 from scanweld.pipeline.problem import graph_problem
 from scanweld.pipeline.registration import Registered
 from scanweld.reconstruction import FactReport
-from scanweld.refinement.scale import ScaleEstimate, estimate_scales
+from scanweld.sensor.scale import estimate_scales
 from scanweld.sensor.standing import standing_scans
 from scanweld.work.progress import ScanRefused
 from scanweld.work.stage_log import Stages
@@ -103,9 +103,7 @@ def refine_placed(
         doubts = merged(_standing_doubts(scene, graph), doubts)
         if axis is not None:
             doubts = merged(doubts, off_axis_doubts(graph, axis))
-        graph = replace(
-            graph, doubts=merged(doubts, _scale_doubts(scene.intake, graph, stages.workers))
-        )
+        graph = replace(graph, doubts=merged(doubts, _scale_doubts(scene, graph, stages.workers)))
         counts["scans"] = sum(len(component.poses) for component in graph.components)
         counts["doubtful"] = len(graph.doubts)
     for k, reason in graph.unplaced.items():
@@ -125,21 +123,19 @@ def _standing_doubts(scene: Scene, graph: ViewGraph) -> Doubts:
     return doubt_of(DoubtCode.CAMERA_STOOD, told)
 
 
-def _scale_doubts(intake: Intake, graph: ViewGraph, workers: int) -> Doubts:
+def _scale_doubts(scene: Scene, graph: ViewGraph, workers: int) -> Doubts:
     """Scans that fit the others better when they are made larger or smaller."""
-    told = {
-        k: estimate.words()
+    found = [
+        estimate_scales(
+            *(scene.intake.prepared, component.poses, graph.compared(component)),
+            *(scene.known_sensor, workers),
+        )
         for component in graph.components
-        for k, estimate in _scales(intake, graph, component, workers).items()
-        if estimate.is_off
+    ]
+    told = {
+        k: estimate.words() for scales in found for k, estimate in scales.items() if estimate.is_off
     }
     return doubt_of(DoubtCode.SCALE, told)
-
-
-def _scales(
-    intake: Intake, graph: ViewGraph, component: Component, workers: int
-) -> dict[int, ScaleEstimate]:
-    return estimate_scales(intake.prepared, component.poses, graph.compared(component), workers)
 
 
 def assess_placed(

@@ -114,7 +114,7 @@ def _firmness(
     diameter, information = sensor.diameter, np.zeros((6, 6))
     for j, matches in ways:
         points, directions = poses[j].apply(matches.points), poses[j].turn(matches.directions)
-        weights = _weights(points, sensor, PATCH_DIAMETERS * diameter)[:, None]
+        weights = match_weights(points, sensor)[:, None]
         moves = jacobian(points, directions, centre, lever_arm(diameter))
         information += (weights * moves).T @ moves
     firm, directions = np.linalg.eigh(information)
@@ -129,12 +129,12 @@ def _carried(away: FloatArray, arm: float) -> FloatArray:
     return carried
 
 
-def _weights(points: FloatArray, sensor: SensorModel, patch: float) -> FloatArray:
+def match_weights(points: FloatArray, sensor: SensorModel) -> FloatArray:
     """One over the variance (N,) of matches; those of a patch together weigh as the patch does.
 
     Matches come from both sides of a pair and say the same twice: each counts half.
     """
-    cell, count = cells_of(points, patch)
+    cell, count = cells_of(points, PATCH_DIAMETERS * sensor.diameter)
     shared = count[cell] * sensor.correlated**2
     return 0.5 / np.maximum(sensor.white**2 + shared, np.finfo(float).tiny)
 

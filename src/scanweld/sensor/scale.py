@@ -22,11 +22,11 @@ from scanweld.refinement.refine import (
     match_surfaces,
 )
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
+from scanweld.sensor.accuracy import match_weights
+from scanweld.sensor.model import SensorModel
 
 MATCH_DIAMETERS = 0.012
 """Farthest match: a scale error of one percent moves a surface by up to half a percent."""
-CORRELATED_MATCHES = 30.0
-"""Matches that count as one independent match: neighbouring ones have errors in common."""
 NUM_ROUNDS = 4
 """Steps of least squares, each with new matches."""
 MIN_ERROR = 0.004
@@ -68,6 +68,7 @@ def estimate_scales(
     scans: Sequence[PreparedScan],
     world_from_sensor: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
+    sensor: SensorModel,
     workers: int = 1,
 ) -> dict[int, ScaleEstimate]:
     """Free the scale of every placed scan beside its pose, in a few steps of least squares.
@@ -76,13 +77,14 @@ def estimate_scales(
         scans: All scans.
         world_from_sensor: Refined poses of a component's, by index in ``scans``.
         pairs: Scans that are matched, (i, j) in any order.
+        sensor: What is known of the sensor.
         workers: Threads; the result is the same for any number.
 
     Returns:
         Estimates of the scans whose surfaces touch others', by index.
     """
     poses = dict(sorted(world_from_sensor.items()))
-    diameter = float(np.median([scans[k].diameter for k in poses]))
+    diameter = sensor.diameter
     sources = {k: surface_source(scans[k], NUM_POINTS) for k in poses}
     arm = lever_arm(diameter)
     logs = dict.fromkeys(poses, 0.0)
@@ -93,7 +95,7 @@ def estimate_scales(
     for _ in range(NUM_ROUNDS):
         terms.clear()  # those of this round take as much memory
         grown = {k: _grown(sources[k], np.exp(-logs[k])) for k in poses}
-        terms = _surface_terms(grown, poses, pairs, diameter, workers)
+        terms = _surface_terms(grown, poses, pairs, sensor, workers)
         order = [k for k in poses if any(k in (term.i, term.j) for term in terms)]
         if len(order) < 2:
             return {}
@@ -151,29 +153,33 @@ def _surface_terms(
     sources: Mapping[int, SurfaceSource],
     poses: Mapping[int, Pose],
     pairs: Collection[tuple[int, int]],
-    diameter: float,
+    sensor: SensorModel,
     workers: int,
 ) -> list[Term]:
+    """Matches, each with its robust weight over the variance that the sensor leaves it."""
+    diameter = sensor.diameter
     found = match_surfaces(sources, poses, pairs, MATCH_DIAMETERS * diameter, workers)
     noise = SURFACE_NOISE_DIAMETERS * diameter, 1.0
-    return weighted_terms(found, [], poses, 0.0, noise)
+    terms = weighted_terms(found, [], poses, 0.0, noise)
+    return [
+        replace(term, weights=term.weights * match_weights(term.points, sensor)) for term in terms
+    ]
 
 
 def _solve(
     terms: Sequence[Term], order: Sequence[int], centres: Mapping[int, FloatArray], arm: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Twists (N, 6) and growths (N,) that make surfaces agree, and the growths' deviations."""
-    unknowns = 7  # of each scan: rotation, translation, growth
+    unknowns = 7  # of each scan: rotation, translation, growth, all of them lengths
     size = unknowns * len(order)
     place = {k: slice(unknowns * n, unknowns * (n + 1)) for n, k in enumerate(order)}
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     centre = np.mean([centres[k] for k in order], axis=0)
-    square, count = 0.0, 0.0
     for term in terms:
         a, b = place[term.i], place[term.j]
         by_motion = term.jacobian(centre, arm)
-        by_i = np.column_stack([by_motion, _by_growth(term, centres[term.i])])
-        by_j = -np.column_stack([by_motion, _by_growth(term, centres[term.j])])
+        by_i = np.column_stack([by_motion, _by_growth(term, centres[term.i]) / arm])
+        by_j = -np.column_stack([by_motion, _by_growth(term, centres[term.j]) / arm])
         weighted_i, weighted_j = (term.weights[:, None] * by for by in (by_i, by_j))
         normal[a, a] += weighted_i.T @ by_i
         normal[b, b] += weighted_j.T @ by_j
@@ -182,8 +188,6 @@ def _solve(
         normal[b, a] += cross.T
         gradient[a] += weighted_i.T @ term.residuals
         gradient[b] += weighted_j.T @ term.residuals
-        square += float(term.weights @ term.residuals**2)
-        count += float(term.weights.sum())
     growths = np.arange(unknowns - 1, size, unknowns)
     # The first scan stays, and a growth of all together is not seen: theirs sum to 0.
     normal[np.ix_(growths, growths)] += np.trace(normal) / size
@@ -192,9 +196,9 @@ def _solve(
     solved = np.zeros(size)
     solved[free] = -inverse @ gradient[free]
     variance = np.zeros(size)
-    variance[free] = np.diag(inverse) * CORRELATED_MATCHES * square / max(count, 1e-300)
+    variance[free] = np.diag(inverse)
     steps = solved.reshape(-1, unknowns)
-    return steps[:, :-1], steps[:, -1], np.sqrt(variance[growths])
+    return steps[:, :-1], steps[:, -1] / arm, np.sqrt(variance[growths]) / arm
 
 
 def _by_growth(term: Term, centre: FloatArray) -> FloatArray:
