@@ -42,8 +42,13 @@ def scales_of(scans: list[PreparedScan], poses: Mapping[int, Pose]) -> dict[int,
     diameter = float(np.median([scan.diameter for scan in scans]))
     white, correlated = 7e-4 * diameter, 1e-4 * diameter
     sensor = SensorModel(
-        **{"num_certain": 9, "sigma": white, "white": white, "correlated": correlated},
-        **{"tolerance": 0.01 * diameter, "max_contradiction": 0.1, "diameter": diameter},
+        num_certain=9,
+        sigma=white,
+        white=white,
+        correlated=correlated,
+        tolerance=0.01 * diameter,
+        max_contradiction=0.1,
+        diameter=diameter,
     )
     return estimate_scales(scans, poses, list(combinations(poses, 2)), sensor)
 

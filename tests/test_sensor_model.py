@@ -167,6 +167,24 @@ def test_patches_in_free_space_are_held_to_what_certain_pairs_show(
     assert through.free_excess(unknown.limits) <= 0.0, "without certain pairs nothing is known"
 
 
+@pytest.mark.parametrize(
+    ("shares", "most"),
+    [
+        ([0.0] * 7 + [0.04, 0.05], 0.0),  # a part that moved is missing from two pairs
+        ([0.0, 0.01, 0.02, 0.03, 0.04, 0.05], 0.05),  # borders that were cut anyhow
+    ],
+)
+def test_what_few_certain_pairs_show_far_more_of_is_not_excused(
+    found: tuple[PreparedPair, PairResult], shares: list[float], most: float
+):
+    pair, result = found
+    best = result.alternatives[0]
+    told = [replace(best, evidence=replace(best.evidence, free_patch=share)) for share in shares]
+    sensor = learnt(pair, *(replace(result, alternatives=(one,)) for one in told))
+    assert sensor.num_certain == len(shares)
+    assert sensor.max_free_patch == pytest.approx(most)
+
+
 @pytest.mark.parametrize("num_scans", [4, 6])
 def test_cycles_tell_how_far_pairs_are_off(found: tuple[PreparedPair, PairResult], num_scans: int):
     """All pairs good and each off by a shift of its own; one that is wrong is not counted."""
