@@ -7,12 +7,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from scanweld.confidence.bounds import Bounds, BoundScale
+from scanweld.confidence.bounds import Bounds
 from scanweld.config import PrepareConfig
 from scanweld.evidence.field import RASTER_DEPTH, RASTER_KIND, ScanField
 from scanweld.evidence.rivals import RIVAL_ANGLE_DEG
 from scanweld.evidence.sample_patches import violating_patches
 from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.gauss_newton import lever_arm
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.geometry.prepared import PixelKind
@@ -262,18 +263,32 @@ def test_a_region_that_moved_before_a_standing_camera_is_found_and_noise_is_not(
 # Bounds.
 
 
-def test_bounds_grow_with_the_deviation_and_with_the_distance_of_surfaces():
-    scale = BoundScale(factor=2.0, of_deviation=0.5, of_sigma=0.5)
-    bounds = Bounds(rotation=scale, translation=scale)
+def test_bounds_grow_with_the_deviation_and_with_what_all_scans_err_alike():
+    bounds = Bounds(rotation=3.0, translation=2.0, floor=4.0)
 
-    def bound(deviation: float, sigma: float, unit: float = 1.0) -> PoseTolerance:
-        told = {0: PoseTolerance(angle_deg=deviation, shift=deviation * unit)}
-        return bounds.of(told, sigma * unit, 100.0 * unit)[0]
+    def bound(deviation: float, correlated: float, unit: float = 1.0) -> PoseTolerance:
+        """Of a scan whose points are off by so much in any way, in percent of the diameter."""
+        arm = lever_arm(100.0)
+        turn = float(np.degrees(deviation / arm))
+        told = {0: PoseTolerance(angle_deg=turn, shift=deviation * unit)}
+        sensor = SensorModel(
+            num_certain=9,
+            sigma=unit,
+            white=unit,
+            correlated=correlated * unit,
+            tolerance=unit,
+            max_contradiction=0.1,
+            diameter=100.0 * unit,
+        )
+        return bounds.of(told, sensor)[0]
 
-    assert bound(0.4, 0.1).shift == pytest.approx(0.4)
-    assert bound(0.8, 0.1).shift > bound(0.4, 0.1).shift
-    assert bound(0.4, 0.4).angle_deg == pytest.approx(2 * bound(0.4, 0.1).angle_deg)
-    assert bound(0.4, 0.1, 1000.0).shift == pytest.approx(1000 * bound(0.4, 0.1).shift)
+    assert bound(0.4, 0.0).shift == pytest.approx(0.8)
+    assert np.radians(bound(0.4, 0.0).angle_deg) * lever_arm(100.0) == pytest.approx(1.2)
+    assert bound(0.3, 0.1).shift == pytest.approx(1.0), "a right triangle of 3, 4, 5"
+    assert bound(0.01, 0.2).angle_deg == pytest.approx(2 * bound(0.01, 0.1).angle_deg, rel=0.01)
+    large = bound(0.4, 0.1, 1000.0)
+    assert large.shift == pytest.approx(1000 * bound(0.4, 0.1).shift)
+    assert large.angle_deg == pytest.approx(bound(0.4, 0.1).angle_deg)
     assert bound(1e9, 50.0) == PoseTolerance(angle_deg=RIVAL_ANGLE_DEG, shift=6.0)
 
 

@@ -70,8 +70,8 @@ def assess(
         config: Settings: what leaves a pose open.
         workers: Threads; the result is the same for any number.
     """
-    sensor, deviations = diagnostics.sensor, _deviations(graph, diagnostics, workers)
-    bounds = calibration.bounds.of(deviations, sensor.sigma, sensor.diameter)
+    deviations = _deviations(graph, diagnostics, workers)
+    bounds = calibration.bounds.of(deviations, diagnostics.sensor)
     homes: dict[int, JointEvidence] = {}
     for component in graph.components:
         joint = joint_evidence(graph, component, diagnostics, workers)

@@ -1,8 +1,8 @@
 """Deviation of a scan's pose -> bounds of its errors that hold for 95 % of the scans.
 
-The deviation that follows from information and noise is too small where a sensor errs alike over
-whole scans: then surfaces lie farther apart, and poses are off by more than in proportion. So
-errors go with powers of both, which the calibration counts.
+The deviation that follows from information and noise is too small where a sensor errs alike in all
+scans: no number of them averages that out. So bounds have a floor in proportion to what neighbours
+share of the error, and the calibration counts by how much.
 """
 
 from collections.abc import Mapping
@@ -13,38 +13,25 @@ import numpy as np
 from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
 from scanweld.geometry.gauss_newton import lever_arm
 from scanweld.geometry.pose_tolerance import PoseTolerance
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class BoundScale:
-    """A bound is ``factor * deviation ** of_deviation * sigma ** of_sigma``.
-
-    All are angles in radians, or shares of the diameter.
-
-    Attributes:
-        factor: Of the whole.
-        of_deviation: Power of the deviation.
-        of_sigma: Power of the distance between surfaces that should coincide.
-    """
-
-    factor: float
-    of_deviation: float
-    of_sigma: float
-
-    def bound(self, deviation: float, sigma: float) -> float:
-        """The bound, likewise an angle or a share."""
-        return self.factor * deviation**self.of_deviation * sigma**self.of_sigma
+from scanweld.sensor.model import SensorModel
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Bounds:
-    """How bounds of rotations and of translations follow from deviations."""
+    """A bound is a factor times the root of ``deviation**2 + (floor * correlated)**2``.
 
-    rotation: BoundScale
-    translation: BoundScale
+    Attributes:
+        rotation: The factor of rotations, which count by the lengths at the lever arm.
+        translation: The factor of translations.
+        floor: Of the error that neighbours share, so much is shared by all scans.
+    """
+
+    rotation: float
+    translation: float
+    floor: float
 
     def of(
-        self, deviations: Mapping[int, PoseTolerance], sigma: float, diameter: float
+        self, deviations: Mapping[int, PoseTolerance], sensor: SensorModel
     ) -> dict[int, PoseTolerance]:
         """Bounds at 95 % of the error of each pose, if it is the right one.
 
@@ -52,16 +39,15 @@ class Bounds:
 
         Args:
             deviations: Standard deviations of the poses.
-            sigma: Robust standard deviation of the distance between surfaces, in the scans' unit.
-            diameter: Of the run, likewise.
+            sensor: What is known of the sensor.
         """
-        turn = sigma / lever_arm(diameter)
+        arm, floor = lever_arm(sensor.diameter), self.floor * sensor.correlated
+        farthest = RIVAL_SHIFT_DIAMETERS * sensor.diameter
         bounds = {}
         for k, one in deviations.items():
-            angle = float(np.degrees(self.rotation.bound(one.angle, turn)))
-            shift = self.translation.bound(one.shift / diameter, sigma / diameter)
+            turn = self.rotation * np.hypot(np.radians(one.angle_deg) * arm, floor) / arm
             bounds[k] = PoseTolerance(
-                angle_deg=min(angle, RIVAL_ANGLE_DEG),
-                shift=min(shift, RIVAL_SHIFT_DIAMETERS) * diameter,
+                angle_deg=min(float(np.degrees(turn)), RIVAL_ANGLE_DEG),
+                shift=min(self.translation * float(np.hypot(one.shift, floor)), farthest),
             )
         return bounds

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from scanweld.confidence.bounds import Bounds, BoundScale
+from scanweld.confidence.bounds import Bounds
 from scanweld.geometry.arrays import FloatArray, frozen
 
-FORMAT = 3
+FORMAT = 4
 MAX_CONFIDENCE = 0.999
 """No calibration is so large, and so like the scans at hand, that more could be said."""
 _FILE = "calibration.json"
@@ -130,7 +130,7 @@ def read_calibration(text: str) -> Calibration:
     return Calibration(
         pair=_read_model(document["pair"]),
         scan=_read_model(document["scan"]),
-        bounds=Bounds(**{name: BoundScale(**each) for name, each in document["bounds"].items()}),
+        bounds=Bounds(**document["bounds"]),
         made=document["made"],
     )
 
