@@ -5,18 +5,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.calibration.scenes import is_stereo
 from benchmarks.kept import Record
 from scanweld.confidence.bounds import Bounds
 from scanweld.evidence.rivals import RIVAL_ANGLE_DEG, RIVAL_SHIFT_DIAMETERS
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.gauss_newton import lever_arm
 
 HELD = 0.95
-"""Share of the scans for which both bounds hold."""
+"""Share of the scans for which both bounds hold,"""
+HELD_EACH = 0.9
+"""and of those of each kind of sensor."""
 QUANTILES = tuple(np.linspace(HELD, 0.995, 10).tolist())
-"""Of rotations and of translations alone; the first by which both hold is taken."""
+"""Of rotations and of translations alone, which are tried,"""
 FLOORS = (0.0, *np.geomspace(0.25, 16.0, 13).tolist())
-"""Which are tried."""
+"""and floors."""
+UNKNOWN = Bounds(rotation=4.0, translation=4.0, floor=1.0)
+"""Where too few scans are right."""
 LEAST = 1e-9
 """Errors below this are of the scan that the others are held against: it has none."""
 
@@ -27,23 +32,29 @@ class Errors(NamedTuple):
     rotations: FloatArray  # (N, 2) errors and deviations
     translations: FloatArray  # (N, 2) likewise
     correlated: FloatArray  # (N,) what neighbours share of the sensor's error
+    is_stereo: BoolArray  # (N,)
 
 
 def learn_bounds(records: Sequence[Record]) -> Bounds:
-    """Bounds below which so many errors lie, whatever their deviation and their sensor."""
+    """The tightest bounds of which enough hold, of all scans and of each kind of sensor.
+
+    A floor makes as many hold of sensors that err alike in all scans as of others.
+    """
     errors = _errors(records)
-    if len(errors.correlated) < len(FLOORS):
-        return Bounds(rotation=2.0, translation=2.0, floor=1.0)
-    *options, widest = QUANTILES
-    return next(
-        (bounds for bounds in (_at(errors, q) for q in options) if _held(bounds, errors) >= HELD),
-        _at(errors, widest),
-    )
+    if not len(errors.correlated):
+        return UNKNOWN
+    options = [
+        bounds
+        for floor in FLOORS
+        for bounds in (_at(errors, quantile, floor) for quantile in QUANTILES)
+        if _suffice(bounds, errors)
+    ]
+    return min(options, default=UNKNOWN, key=lambda bounds: _width(bounds, errors))
 
 
 def _errors(records: Sequence[Record]) -> Errors:
     """Of all scans but those that others are held against, and those held against a wrong one."""
-    rotations, translations, correlated = [], [], []
+    rotations, translations, correlated, stereo = [], [], [], []
     for record in records:
         for scan in record.result["scans"]:
             if "errors" not in scan:
@@ -54,15 +65,17 @@ def _errors(records: Sequence[Record]) -> Errors:
                 rotations.append([lever_arm(1.0) * one for one in turn])
                 translations.append(shift)
                 correlated.append(record.result["sensor"]["correlated"])
+                stereo.append(is_stereo(record.unit["seed"]))
     return Errors(
         np.array(rotations).reshape(-1, 2),
         np.array(translations).reshape(-1, 2),
         np.array(correlated),
+        np.array(stereo, dtype=bool),
     )
 
 
-def _held(bounds: Bounds, errors: Errors) -> float:
-    """Share of the scans of which both bounds hold."""
+def _suffice(bounds: Bounds, errors: Errors) -> bool:
+    """Whether both bounds hold of as many scans as they should."""
     holds = [
         told[:, 0] <= factor * _spread(told, errors, bounds.floor)
         for factor, told in (
@@ -70,27 +83,25 @@ def _held(bounds: Bounds, errors: Errors) -> float:
             (bounds.translation, errors.translations),
         )
     ]
-    return float(np.all(holds, axis=0).mean())
+    both = np.all(holds, axis=0)
+    kinds = [both[errors.is_stereo == kind] for kind in (True, False)]
+    return both.mean() >= HELD and all(kind.mean() >= HELD_EACH for kind in kinds if len(kind))
 
 
-def _at(errors: Errors, quantile: float) -> Bounds:
-    """Factors by quantile regression of the logarithms (Koenker & Bassett 1978).
-
-    Unlike one factor for all, a floor makes as many bounds hold of sensors that err alike in all
-    scans as of others.
-    """
-    fits = []
-    for floor in FLOORS:
-        loss, factors = 0.0, []
-        for told in (errors.rotations, errors.translations):
-            ratio = np.log(told[:, 0] / _spread(told, errors, floor))
-            factor = np.quantile(ratio, quantile)
-            loss += float(np.mean(np.maximum(quantile * (ratio - factor), 0.0)))
-            loss += float(np.mean(np.maximum((1.0 - quantile) * (factor - ratio), 0.0)))
-            factors.append(float(np.exp(factor)))
-        fits.append((loss, floor, factors))
-    _, floor, (rotation, translation) = min(fits)
+def _at(errors: Errors, quantile: float, floor: float) -> Bounds:
+    """Bounds with that floor, of which that share holds of rotations and of translations."""
+    rotation, translation = (
+        float(np.quantile(told[:, 0] / _spread(told, errors, floor), quantile))
+        for told in (errors.rotations, errors.translations)
+    )
     return Bounds(rotation=rotation, translation=translation, floor=floor)
+
+
+def _width(bounds: Bounds, errors: Errors) -> float:
+    """How wide bounds are, as a mean of logarithms."""
+    rotations = bounds.rotation * _spread(errors.rotations, errors, bounds.floor)
+    translations = bounds.translation * _spread(errors.translations, errors, bounds.floor)
+    return float(np.log(rotations).mean() + np.log(translations).mean())
 
 
 def _spread(told: FloatArray, errors: Errors, floor: float) -> FloatArray:

@@ -32,12 +32,10 @@ OTHER = 500_000
 
 def make_set(seed: int) -> Scene:
     """The scans of a set, in random frames, and the truth about them."""
-    rng = np.random.default_rng([seed, 11])
-    family = str(rng.choice([make.__name__ for make in SOLIDS], p=list(SOLIDS.values())))
+    family, has_two_eyes, rng = _kind(seed)
     body = _make_solid(family, seed)
-    is_stereo = rng.random() < STEREO
     noise = NoiseModel(
-        depth_diameters=MAX_NOISE * 10 ** rng.uniform(-1.7, -0.5 if is_stereo else 0.0),
+        depth_diameters=MAX_NOISE * 10 ** rng.uniform(-1.7, -0.5 if has_two_eyes else 0.0),
         dropout=float(rng.choice([0.0, 0.01, 0.1, 0.3])),
         grazing_dropout=rng.uniform(0.3, 0.9),
     )
@@ -46,13 +44,25 @@ def make_set(seed: int) -> Scene:
     if rng.random() < SCENERY:
         taking = (on_table, on_turntable, held_by_hand)[int(rng.integers(3))]
     shots = with_mark_seen(taking(body, views, noise, seed), body, views, HIDDEN_PIXELS + 1)
-    if is_stereo:
+    if has_two_eyes:
         shots = _stereo(rng)(shots, rng)
     if rng.random() < HARM:
         shots = _harm(body, rng)(shots, rng)
     if rng.random() < STRANGERS:
         shots = [*shots, *_strangers(family, noise, seed, rng)][-MAX_SCANS:]
     return replace(posed(shots, body, _diameter(body), seed), limits=BASIN)
+
+
+def is_stereo(seed: int) -> bool:
+    """Whether a set is seen by a depth camera of two eyes."""
+    return _kind(seed)[1]
+
+
+def _kind(seed: int) -> tuple[str, bool, Rng]:
+    """Family of a set's object, whether its sensor has two eyes, and what draws the rest."""
+    rng = np.random.default_rng([seed, 11])
+    family = str(rng.choice([make.__name__ for make in SOLIDS], p=list(SOLIDS.values())))
+    return family, rng.random() < STEREO, rng
 
 
 def _diameter(body: Body) -> float:
