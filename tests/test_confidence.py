@@ -84,7 +84,7 @@ def test_what_is_no_model_is_refused():
     with pytest.raises(ValueError, match="odds never fall"):
         Model(curves={}, slope=-0.1, offset=0.0, most=1.0)
     with pytest.raises(ValueError, match="the model has"):
-        MODELS["pair"].probability({"agree": 1.0})
+        MODELS["pair"].probability({"margin": 1.0})
     document = json.loads(stored_calibration().to_json())
     with pytest.raises(ValueError, match="format 99, this version reads"):
         read_calibration(json.dumps({**document, "format": 99}))
@@ -153,7 +153,7 @@ def test_pairs_conduct_like_wires(monkeypatch: pytest.MonkeyPatch):
     }
     component = component_of(3)
     graph = graph_with(pairs, component, accepted=pairs)
-    fit = Fit(observability=1.0, residual=0.0, misfit=0.0, coherence=1.0)
+    fit = Fit(observability=1.0, misfit=0.0, coherence=1.0)
     monkeypatch.setattr("scanweld.confidence.joint_evidence._fit", lambda *_: fit)
     pair = creature_pair(40)
     judge = replace(pair.judge(), fields=pair.fields + pair.fields)

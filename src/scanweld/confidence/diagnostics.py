@@ -21,14 +21,12 @@ class Fit:
 
     Attributes:
         observability: Smallest over largest eigenvalue of the information.
-        residual: Rms of the point-to-plane residuals over what the sensor leaves of them where
-            surfaces coincide (``SensorModel.sigma``); 1 where there are none.
-        misfit: What is left of them when noise is averaged out, over the same.
+        misfit: What is left of the distances between the surfaces when noise is averaged out, over
+            what they are where surfaces coincide (``SensorModel.sigma``); 1 where there are none.
         coherence: Share of the contours that cohere.
     """
 
     observability: float
-    residual: float
     misfit: float
     coherence: float
 
@@ -53,10 +51,9 @@ class PairDiagnostics:
         """How two scans fit at a pose; where contours are not asked about, none cohere."""
         fields, size = self.judge.fields, (self.judge.tolerance, self.judge.diameter)
         off = pair_misfit(self.sources[i], self.sources[j], i_from_j, *size)
-        information, rms, _ = information_of(fields[i], fields[j], i_from_j, *size)
+        information, _, _ = information_of(fields[i], fields[j], i_from_j, *size)
         return Fit(
             observability=observability_of(information),
-            residual=over(rms, self.sensor.sigma),
             misfit=over(off, self.sensor.sigma),
             coherence=self.contours.coherence(i, j, i_from_j) if at_contours else 0.0,
         )
@@ -74,6 +71,6 @@ def diagnostics_of(
     )
 
 
-def over(residual: float, sigma: float) -> float:
-    """A residual over the sensor's standard deviation; 1 where there is none."""
-    return residual / sigma if residual == residual and sigma > 0 else 1.0
+def over(distance: float, sigma: float) -> float:
+    """A distance over the sensor's standard deviation; 1 where that is unknown."""
+    return distance / sigma if sigma > 0 else 1.0

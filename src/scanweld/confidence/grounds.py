@@ -9,7 +9,7 @@ import numpy as np
 
 from scanweld.confidence.diagnostics import Fit
 from scanweld.confidence.joint_evidence import MIN_CONDUCTANCE, JointEvidence
-from scanweld.evidence.evidence import MIN_AGREE, Evidence
+from scanweld.evidence.evidence import Evidence
 from scanweld.pairs.result import Alternative, PairResult, margin_among, refutation_among
 
 Grounds = Mapping[str, float]
@@ -47,29 +47,25 @@ def pair_grounds(
     observability = fit.observability
     margin = margin_among(chosen, result.alternatives)
     refutation = refutation_among(chosen, result.alternatives)
-    support = opposition = consent = 0.0
+    support = opposition = 0.0
     if joint is not None and not is_accepted:
         opposition = -joint.conductance[result.i, result.j]
     if joint is not None and is_accepted:
         support = joint.conductance_without((result.i, result.j), chosen.score)
-        consent = -max(violated(joint.said_of(k)) for k in (result.i, result.j))
         if is_corroborated(support):
             both = result.i, result.j
             margin = max(margin, min(joint.margins[k] for k in both))
             refutation = max(refutation, min(joint.refutations[k] for k in both))
             observability = max(observability, min(joint.fits[k].observability for k in both))
     return {
-        "agree": float(np.log10(max(told.agree, LEAST_SHARE))),
         "contradiction": -min(told.contradiction, MAX_CONTRADICTION),
         "margin": max(margin, -1.0),
         "refutation": refutation,
         "observability": float(np.log10(max(observability, LEAST_OBSERVABILITY))),
         "coherence": fit.coherence,
-        "residual": -_magnitude(fit.residual),
         "misfit": -_magnitude(fit.misfit),
         "support": support,
         "opposition": opposition,
-        "consent": consent,
     }
 
 
@@ -87,16 +83,13 @@ def scan_grounds(
         link: How surely pairs tie it to the reference scan.
         coherence: The best contour coherence of its accepted pairs.
     """
-    said, fit = joint.said_of(k), joint.fits[k]
-    agree, patches = sum(e.agree for e in said), sum(e.patches for e in said)
+    fit = joint.fits[k]
     return {
-        "consent": -violated(said),
-        "contradiction": -min(patches / max(agree, MIN_AGREE), MAX_CONTRADICTION),
+        "consent": -violated(joint.said_of(k)),
         "margin": joint.margins[k],
         "refutation": joint.refutations[k],
         "observability": float(np.log10(max(fit.observability, LEAST_OBSERVABILITY))),
         "coherence": coherence,
-        "residual": -_magnitude(fit.residual),
         "misfit": -_magnitude(fit.misfit),
         "link": link,
     }

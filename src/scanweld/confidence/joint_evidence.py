@@ -156,14 +156,13 @@ def _fit(k: int, poses: Poses, diagnostics: PairDiagnostics) -> Fit:
     fields, tolerance, diameter = judge.fields, judge.tolerance, judge.diameter
     k_from = {m: poses[k].inverse() @ pose for m, pose in sorted(poses.items()) if m != k}
     found = [two_way_matches(fields[k], fields[m], pose, tolerance) for m, pose in k_from.items()]
-    information, rms, _ = information_from(found, diameter)
+    information, _, _ = information_from(found, diameter)
     patches = [
         two_way_offsets(sources[k], sources[m], pose, tolerance, diameter)
         for m, pose in k_from.items()
     ]
     return Fit(
         observability=observability_of(information),
-        residual=over(rms, diagnostics.sensor.sigma),
         misfit=over(misfit(np.concatenate(patches)), diagnostics.sensor.sigma),
         coherence=0.0,
     )
