@@ -19,8 +19,6 @@ Said = TypeVar("Said")
 
 MIN_ALIKE = 2
 """So many pairs, more than half of their kind, must say the same of the object to be quoted."""
-EACH_EXCESS = 0.5 * MAX_EXCESS
-"""The same of each of two pairs that show a part in free space: together they come to as much."""
 OUTWEIGHED = 2.0
 """Accepted pairs outweigh a good one that disagrees if their scores sum to so many times its."""
 
@@ -173,8 +171,8 @@ def _unexplained(
     limits = judge.limits
     in_front = {e: said for e, said in told.items() if said.front_excess(limits) > MAX_EXCESS}
     in_free_space: dict[Edge, Evidence] = {}
-    if seen_twice(said.free_excess(limits) for said in told.values()) > EACH_EXCESS:
-        in_free_space = {e: d for e, d in told.items() if d.free_excess(limits) > EACH_EXCESS}
+    if seen_twice(said.free_excess(limits) for said in told.values()) > MAX_EXCESS:
+        in_free_space = {e: d for e, d in told.items() if d.free_excess(limits) > MAX_EXCESS}
     return (
         _largest({edge: said.front_patch for edge, said in in_front.items()}),
         _largest({edge: said.free_patch for edge, said in in_free_space.items()}),
