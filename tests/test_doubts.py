@@ -60,7 +60,7 @@ def test_a_part_that_two_pairs_see_through_is_doubted_and_a_shadow_in_one_is_not
 
     def says(i: int, j: int, i_from_j: Pose) -> Evidence:
         is_through = (min(i, j), max(i, j)) in through
-        return replace(seen(0.0), free_patch=LIMITS.free + 0.02 * is_through)
+        return replace(seen(0.0), free_patch=LIMITS.free + 0.04 * is_through)
 
     codes = {
         k: [doubt.code.value for doubt in doubts]
