@@ -22,6 +22,8 @@ FLOORS = (0.0, *np.geomspace(0.25, 16.0, 13).tolist())
 """and floors."""
 UNKNOWN = Bounds(rotation=4.0, translation=4.0, floor=1.0)
 """Where too few scans are right."""
+FARTHEST_TURN = lever_arm(1.0) * np.radians(RIVAL_ANGLE_DEG)
+"""Rotations by which poses are rivals, as a share of the diameter."""
 LEAST = 1e-9
 """Errors below this are of the scan that the others are held against: it has none."""
 
@@ -59,12 +61,11 @@ def _errors(records: Sequence[Record]) -> Errors:
         for scan in record.result["scans"]:
             if "errors" not in scan:
                 continue
-            turn, shift = (scan["errors"][what][:2] for what in ("rotation", "translation"))
-            is_near = turn[0] < np.radians(RIVAL_ANGLE_DEG) and shift[0] < RIVAL_SHIFT_DIAMETERS
-            if turn[0] > LEAST and is_near:
-                rotations.append([lever_arm(1.0) * one for one in turn])
+            turn, shift = (scan["errors"][what] for what in ("rotation", "translation"))
+            if turn[0] > LEAST and turn[0] < FARTHEST_TURN and shift[0] < RIVAL_SHIFT_DIAMETERS:
+                rotations.append(turn)
                 translations.append(shift)
-                correlated.append(record.result["sensor"]["correlated"])
+                correlated.append(scan["errors"]["correlated"])
                 stereo.append(is_stereo(record.unit["seed"]))
     return Errors(
         np.array(rotations).reshape(-1, 2),

@@ -19,7 +19,6 @@ from scanweld.geometry.pose import Pose
 from scanweld.io import PoseSet
 from scanweld.pipeline.run import run
 from scanweld.reconstruction import Reconstruction
-from scanweld.sensor.model import SensorModel
 
 CONFIG = Config(fusion=FusionConfig(max_voxels_across=50))
 """The defaults; nobody looks at the model."""
@@ -58,19 +57,7 @@ class Sets(Kept):
             if pair.i_from_j is not None
         ]
         scans = _with_errors(_scans(found, scene), found, scene)
-        return {"pairs": pairs, "scans": scans, "sensor": _told(found.sensor)}
-
-
-def _told(sensor: SensorModel | None) -> Result:
-    """What a set says of its sensor, lengths as shares of the diameter."""
-    if sensor is None:
-        return {}
-    lengths = {
-        **{"sigma": sensor.sigma, "white": sensor.white, "correlated": sensor.correlated},
-        **{"closure": sensor.closure, "misclosure": sensor.misclosure},
-    }
-    shares = {name: length / sensor.diameter for name, length in lengths.items()}
-    return {**shares, "certain": sensor.num_certain, "cycles": sensor.num_cycles}
+        return {"pairs": pairs, "scans": scans}
 
 
 def _is_right(i: str, j: str, i_from_j: Pose, scene: Scene) -> bool | None:
@@ -103,7 +90,10 @@ def _scans(found: Reconstruction, scene: Scene) -> list[dict[str, Any]]:
 def _with_errors(
     records: list[dict[str, Any]], found: Reconstruction, scene: Scene
 ) -> list[dict[str, Any]]:
-    """Records of scans that are not wrong with their errors, and what their bounds are made of."""
+    """Records of scans that are not wrong with what their bounds are made of.
+
+    Errors and deviations are shares of the diameter, rotations at the lever arm.
+    """
     estimate = PoseSet(poses=dict(found.poses), components=found.components)
     errors = evaluate_poses(
         estimate, scene.truth, centroids=scene.centroids, diameter=scene.diameter
@@ -113,13 +103,12 @@ def _with_errors(
         if found.sensor is None or error is None or report.deviation is None:
             continue
         if record["right"] is not False and np.isfinite(error.rotation_deg):
-            diameter, sigma = found.sensor.diameter, found.sensor.sigma
-            turns = error.rotation_deg, report.deviation_deg
+            diameter, arm = found.sensor.diameter, lever_arm(1.0)
+            turns = np.radians((error.rotation_deg, report.deviation_deg)) * arm
+            shifts = error.translation / diameter, report.deviation / diameter
             record["errors"] = {
-                "rotation": [*np.radians(turns).tolist(), sigma / lever_arm(diameter)],
-                "translation": [
-                    length / diameter for length in (error.translation, report.deviation, sigma)
-                ],
+                **{"rotation": turns.tolist(), "translation": shifts},
+                "correlated": found.sensor.correlated / diameter,
             }
     return records
 

@@ -7,7 +7,6 @@ from benchmarks.calibration.scenes import is_stereo
 from benchmarks.kept import Record
 from scanweld.confidence.bounds import Bounds
 from scanweld.geometry.arrays import FloatArray
-from scanweld.geometry.gauss_newton import lever_arm
 
 SHARED = 3.0
 """How much larger the error that all scans of a stereo camera share is than that of neighbours."""
@@ -21,31 +20,21 @@ def drawn(seed: int, rng: np.random.Generator) -> Record:
     scans = []
     for _ in range(4):
         turn, shift = (spread * abs(rng.normal(size=2))).tolist()
-        arm = lever_arm(1.0)
-        errors = {
-            "rotation": [turn / arm, deviation / arm, 0.0],
-            "translation": [shift, deviation, 0.0],
-        }
-        scans.append({"errors": errors})
+        errors = {"rotation": [turn, deviation], "translation": [shift, deviation]}
+        scans.append({"errors": {**errors, "correlated": correlated}})
     scans[2]["errors"]["rotation"][0] = scans[2]["errors"]["translation"][0] = 0.0
-    scans[3]["errors"]["rotation"][0] = 2.0
-    return Record(
-        unit={"seed": seed}, result={"scans": scans, "sensor": {"correlated": correlated}}
-    )
+    scans[3]["errors"]["rotation"][0] = 0.5
+    return Record(unit={"seed": seed}, result={"scans": scans})
 
 
 def held(bounds: Bounds, records: list[Record]) -> FloatArray:
     """Which hold, (N,), of the scans that are neither."""
     holds = []
-    for record in records:
-        floor = bounds.floor * record.result["sensor"]["correlated"]
-        for scan in record.result["scans"][:2]:
-            turn, shift = scan["errors"]["rotation"], scan["errors"]["translation"]
-            at_arm = lever_arm(1.0) * np.array(turn)
-            is_turn_held = at_arm[0] <= bounds.rotation * np.hypot(at_arm[1], floor)
-            holds.append(
-                is_turn_held and shift[0] <= bounds.translation * np.hypot(shift[1], floor)
-            )
+    for errors in (scan["errors"] for record in records for scan in record.result["scans"][:2]):
+        floor = bounds.floor * errors["correlated"]
+        (turn, turned), (shift, shifted) = errors["rotation"], errors["translation"]
+        is_turn_held = turn <= bounds.rotation * np.hypot(turned, floor)
+        holds.append(is_turn_held and shift <= bounds.translation * np.hypot(shifted, floor))
     return np.array(holds)
 
 
