@@ -1,15 +1,15 @@
 """What does not move with the object: a room that stands still around it, a lid that is opened."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.virtual.bodies import Body, Rng, joined, middle, shifted
+from benchmarks.virtual.bodies import Body, Rng, middle, shifted
 from benchmarks.virtual.scenery import UP, take_beside
 from benchmarks.virtual.shots import JITTER_DEG, Shot
 from scanweld.evaluation.primitives import box, cylinder
 from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import View, camera_axes, view_along
 from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.mesh import TriangleMesh
@@ -99,7 +99,7 @@ def _room(body: Body, world_from_sensor: Pose, rng: Rng) -> TriangleMesh:
         way = np.array([1.0, 0.0, 0.0]) @ _towards(ahead, aside)
         place = ground + size * rng.uniform(*CLUTTER_AWAY) * way
         parts.append(shifted(_thing(size, rng), place))
-    return _together(parts)
+    return joined(*parts)
 
 
 def _folds(places: FloatArray, rng: Rng) -> FloatArray:
@@ -148,13 +148,6 @@ def _towards(ahead: FloatArray, turn: float) -> FloatArray:
     """Rotation about z, for rows, of x to a horizontal direction (3,), turned by radians more."""
     angle = np.arctan2(ahead[1], ahead[0]) + turn
     return rotation_exp(np.array([0.0, 0.0, angle])).T
-
-
-def _together(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
-    whole = meshes[0]
-    for mesh in meshes[1:]:
-        whole = joined(whole, mesh)
-    return whole
 
 
 def _pixels_of(body: Body, beside: TriangleMesh, view: View) -> BoolArray:

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from benchmarks.virtual.bodies import Body, Rng, joined, middle, shifted
+from benchmarks.virtual.bodies import Body, Rng, middle, shifted
 from benchmarks.virtual.shots import Shot, Views, take
 from scanweld.evaluation.primitives import cylinder
 from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import View
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
