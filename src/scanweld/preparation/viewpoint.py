@@ -5,6 +5,8 @@ cell of a raster square to that line. Of all such lines the one is taken from wh
 least steep on average, by a mean over all that are nearly as good as the best.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
@@ -13,18 +15,6 @@ from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.resolution import point_spacing
 
-FIRST_POINTS = 6_000
-"""Points of a scan that the first steps of the search use, at most; the last uses more."""
-NUM_COARSE = 300
-"""Directions on the half sphere that are tried first, about 8 deg apart."""
-NUM_FINE = 2_000
-"""Directions on the half sphere of which those near the best ones are tried, about 3 deg apart."""
-NUM_STARTS = 6
-"""Distinct coarse directions around which fine ones are tried."""
-START_DEG = 10.0
-"""Angle within which fine directions are tried around each of these,"""
-CAP_DEG = 25.0
-"""and within which they are averaged around the best of all."""
 CELL_SPACINGS = 1.5
 """Cell of the raster, in spacings of the points."""
 LAYERED_CELLS = 1.5
@@ -38,6 +28,30 @@ NEARLY = 0.005
 """Excess of the cost over the least at which a direction's weight has fallen to 1/e."""
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Search:
+    """How the line of sight is searched for, coarse to fine.
+
+    Attributes:
+        first_points: Of a scan, in the first steps, at most; the last uses more.
+        num_coarse: Directions on the half sphere that are tried first, about 8 deg apart.
+        num_fine: Directions of which those near the best ones are tried, about 3 deg apart.
+        num_starts: Distinct coarse directions around which fine ones are tried.
+        start_deg: Angle within which they are, around each.
+        cap_deg: Angle within which they are averaged around the best of all.
+    """
+
+    first_points: int = 6_000
+    num_coarse: int = 300
+    num_fine: int = 2_000
+    num_starts: int = 6
+    start_deg: float = 10.0
+    cap_deg: float = 25.0
+
+
+_SEARCH = _Search()
+
+
 def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """The line along which points (N, 3) look most like a height field.
 
@@ -48,17 +62,16 @@ def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray,
     """
     frame = _principal_frame(points)
     centred = (points - points.mean(axis=0)) @ frame.T
-    first = _thinned(centred, FIRST_POINTS)
+    first = _thinned(centred, _SEARCH.first_points)
     cell = CELL_SPACINGS * point_spacing(first)
-    coarse, fine = _half_sphere(NUM_COARSE), _half_sphere(NUM_FINE)
-    candidates = np.concatenate(
-        [_cap(fine, start, START_DEG) for start in _starts(coarse, _costs(first, coarse, cell))]
-    )
+    coarse, fine = _half_sphere(_SEARCH.num_coarse), _half_sphere(_SEARCH.num_fine)
+    starts = _starts(coarse, _costs(first, coarse, cell))
+    candidates = np.concatenate([_cap(fine, start, _SEARCH.start_deg) for start in starts])
     best = candidates[int(np.argmin(_costs(first, candidates, cell)))]
 
     dense = _thinned(centred, NUM_SAMPLED)
     cell = CELL_SPACINGS * point_spacing(dense)
-    cap = _cap(fine, best, CAP_DEG)
+    cap = _cap(fine, best, _SEARCH.cap_deg)
     costs = _costs(dense, cap, cell)
     axis = np.exp((costs.min() - costs) / NEARLY) @ cap
     axis /= np.linalg.norm(axis)
@@ -127,9 +140,9 @@ def _starts(axes: FloatArray, costs: FloatArray) -> list[FloatArray]:
     """The best few axes that are farther from each other than the caps around them reach."""
     starts: list[FloatArray] = []
     for axis in axes[np.argsort(costs, kind="stable")]:
-        if all(abs(axis @ other) < np.cos(np.radians(1.5 * START_DEG)) for other in starts):
+        if all(abs(axis @ other) < np.cos(np.radians(1.5 * _SEARCH.start_deg)) for other in starts):
             starts.append(axis)
-        if len(starts) == NUM_STARTS:
+        if len(starts) == _SEARCH.num_starts:
             break
     return starts
 
