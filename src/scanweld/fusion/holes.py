@@ -34,12 +34,20 @@ logger = logging.getLogger(__name__)
 
 Closing = Literal["fill", "carve"]
 
-_COARSE_ACROSS = 128
-"""Nodes of the coarse grid along the longest side of the surface, at most."""
-_MIN_COARSE_VOXELS = 4.0
-"""Least spacing of the coarse nodes, in voxels."""
-_COARSE_MARGIN = 3
-"""Nodes around the surface; the outermost are outside of everything."""
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _CoarseGrid:
+    """How fine the coarse grid is.
+
+    Attributes:
+        across: Nodes along the longest side of the surface, at most.
+        min_voxels: Least spacing of the nodes, in voxels.
+        margin: Nodes around the surface; the outermost are outside of everything.
+    """
+
+    across: int = 128
+    min_voxels: float = 4.0
+    margin: int = 3
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -59,7 +67,7 @@ class _Relaxation:
     rounds: int = 3
 
 
-_RELAXATION = _Relaxation()
+_COARSE_GRID, _RELAXATION = _CoarseGrid(), _Relaxation()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -135,9 +143,10 @@ def _coarse_field(
     low = volume.origin + volume.voxel * BLOCK * volume.blocks.min(axis=0)
     high = volume.origin + volume.voxel * BLOCK * (volume.blocks.max(axis=0) + 1)
     extent = high - low
-    spacing = max(_MIN_COARSE_VOXELS * volume.voxel, float(extent.max()) / _COARSE_ACROSS)
-    origin = low - _COARSE_MARGIN * spacing
-    shape = np.ceil((extent / spacing + 2 * _COARSE_MARGIN + 1) / BLOCK).astype(np.int64)
+    grid = _COARSE_GRID
+    spacing = max(grid.min_voxels * volume.voxel, float(extent.max()) / grid.across)
+    origin = low - grid.margin * spacing
+    shape = np.ceil((extent / spacing + 2 * grid.margin + 1) / BLOCK).astype(np.int64)
     blocks = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3)
     # Cut off where weights end: thinner parts of an object are the fine field's business.
     truncation = DEPTH_VOXELS * spacing

@@ -15,17 +15,26 @@ from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.resolution import point_spacing
 
-CELL_SPACINGS = 1.5
-"""Cell of the raster, in spacings of the points."""
-LAYERED_CELLS = 1.5
-"""Standard deviation of depth within a cell, in cells, above which it holds several layers."""
-MAX_DEVIATION = 4.0
-"""Most that a cell's deviation of depth counts, in cells."""
-STEEPNESS_WEIGHT = 0.1
-"""Weight of the mean deviation of depth, a measure of steepness, beside the share of layered
-cells."""
-NEARLY = 0.005
-"""Excess of the cost over the least at which a direction's weight has fallen to 1/e."""
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Cost:
+    """How unlike a height field points are along a direction.
+
+    Attributes:
+        cell_spacings: Cell of the raster, in spacings of the points.
+        layered_cells: Standard deviation of depth within a cell, in cells, above which it holds
+            several layers.
+        max_deviation: Most that a cell's deviation of depth counts, in cells.
+        steepness_weight: Of the mean deviation of depth, a measure of steepness, beside the share
+            of layered cells.
+        nearly: Excess of the cost over the least at which a direction's weight has fallen to 1/e.
+    """
+
+    cell_spacings: float = 1.5
+    layered_cells: float = 1.5
+    max_deviation: float = 4.0
+    steepness_weight: float = 0.1
+    nearly: float = 0.005
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -49,7 +58,7 @@ class _Search:
     cap_deg: float = 25.0
 
 
-_SEARCH = _Search()
+_COST, _SEARCH = _Cost(), _Search()
 
 
 def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -63,17 +72,17 @@ def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray,
     frame = _principal_frame(points)
     centred = (points - points.mean(axis=0)) @ frame.T
     first = _thinned(centred, _SEARCH.first_points)
-    cell = CELL_SPACINGS * point_spacing(first)
+    cell = _COST.cell_spacings * point_spacing(first)
     coarse, fine = _half_sphere(_SEARCH.num_coarse), _half_sphere(_SEARCH.num_fine)
     starts = _starts(coarse, _costs(first, coarse, cell))
     candidates = np.concatenate([_cap(fine, start, _SEARCH.start_deg) for start in starts])
     best = candidates[int(np.argmin(_costs(first, candidates, cell)))]
 
     dense = _thinned(centred, NUM_SAMPLED)
-    cell = CELL_SPACINGS * point_spacing(dense)
+    cell = _COST.cell_spacings * point_spacing(dense)
     cap = _cap(fine, best, _SEARCH.cap_deg)
     costs = _costs(dense, cap, cell)
-    axis = np.exp((costs.min() - costs) / NEARLY) @ cap
+    axis = np.exp((costs.min() - costs) / _COST.nearly) @ cap
     axis /= np.linalg.norm(axis)
     layered, _ = _depth_within_cells(dense, axis, cell)
     right = _square_to(axis)
@@ -150,7 +159,7 @@ def _starts(axes: FloatArray, costs: FloatArray) -> list[FloatArray]:
 def _costs(points: FloatArray, axes: FloatArray, cell: float) -> FloatArray:
     """How unlike a gentle height field the points are along each axis."""
     found = np.array([_depth_within_cells(points, axis, cell) for axis in axes])
-    return found @ (1.0, STEEPNESS_WEIGHT)
+    return found @ (1.0, _COST.steepness_weight)
 
 
 def _depth_within_cells(points: FloatArray, axis: FloatArray, cell: float) -> tuple[float, float]:
@@ -162,8 +171,8 @@ def _depth_within_cells(points: FloatArray, axis: FloatArray, cell: float) -> tu
     mean = np.bincount(cells, weights=depth) / filled
     variance = np.bincount(cells, weights=depth * depth) / filled - mean * mean
     deviation = np.sqrt(np.maximum(variance, 0)) / cell
-    layered = float(count[deviation > LAYERED_CELLS].sum()) / len(points)
-    return layered, float(count @ np.minimum(deviation, MAX_DEVIATION)) / len(points)
+    layered = float(count[deviation > _COST.layered_cells].sum()) / len(points)
+    return layered, float(count @ np.minimum(deviation, _COST.max_deviation)) / len(points)
 
 
 def _raster(

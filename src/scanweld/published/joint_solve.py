@@ -32,6 +32,9 @@ class Damping:
     most: float = 1e6
 
 
+RULE = Damping()
+
+
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
 class Pulls:
     """Residuals of two views, each changed by the motion of a point along a direction.
@@ -77,23 +80,22 @@ def levenberg_marquardt(
         The poses, and the cost at the start and after each accepted step.
     """
     current, pulls = dict(poses), pulls_at(poses)
-    rule = Damping()
-    costs, damping = [cost_of(pulls)], rule.first
+    costs, damping = [cost_of(pulls)], RULE.first
     while len(costs) <= MAX_STEPS:
         centre = np.concatenate([each.points for each in pulls]).mean(axis=0)
         free, normal, gradient = _normal_equations(pulls, current, held, centre, arm)
         scale = float(np.trace(normal)) / max(len(normal), 1)
-        while damping <= rule.most and scale > 0:
+        while damping <= RULE.most and scale > 0:
             twist = -np.linalg.solve(normal + damping * scale * np.eye(len(normal)), gradient)
             trial = _moved(current, free, twist.astype(np.float64), centre, arm)
             trial_pulls = pulls_at(trial)
             cost = cost_of(trial_pulls)
             if cost < costs[-1]:
                 break
-            damping *= rule.factor
+            damping *= RULE.factor
         else:
             break
-        current, pulls, damping = trial, trial_pulls, max(damping / rule.factor, rule.least)
+        current, pulls, damping = trial, trial_pulls, max(damping / RULE.factor, RULE.least)
         costs.append(cost)
         if costs[-2] - cost <= SMALL_DECREASE * costs[-2]:
             break
