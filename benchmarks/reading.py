@@ -27,6 +27,7 @@ from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.io import read_scan
 from scanweld.io.mesh_write import glb_bytes, stl_bytes
+from scanweld.work.stage_log import peak_memory_mb
 
 ROWS, COLUMNS = 1000, 2000
 MOST_SECONDS = 2.0
@@ -127,12 +128,12 @@ def measured(path: Path) -> Json:
         small = path.with_name(f"small{path.suffix}")
         small.write_bytes(fuzz.samples()[WARM[path.name]]())
         read_scan(small)
-    before, begin = fuzz.peak_megabytes(), time.process_time()
+    before, begin = peak_memory_mb(), time.process_time()
     count = len(read_scan(path).points)
     seconds = time.process_time() - begin
     return {
         **{"name": path.name, "points": count, "size": path.stat().st_size / 1e6},
-        **{"seconds": seconds, "megabytes": fuzz.peak_megabytes() - before},
+        **{"seconds": seconds, "megabytes": peak_memory_mb() - before},
     }
 
 
