@@ -1,4 +1,4 @@
-"""What measuring depth cameras and video has in common: options, kept records, frames of data."""
+"""What measuring commands have in common: options, kept records, frames of data."""
 
 import argparse
 from collections.abc import Collection, Sequence

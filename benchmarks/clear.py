@@ -11,7 +11,7 @@ from itertools import combinations, product
 
 from benchmarks.calibration.scenes import make_set
 from benchmarks.judging.trial import is_right_pair
-from benchmarks.kept import Kept, Record, Result, Unit
+from benchmarks.kept import Record, Result, Unit
 from benchmarks.results import Json
 from benchmarks.virtual.scene import Scene as Truth
 from scanweld.config import Config
@@ -35,7 +35,7 @@ SCORES, MARGINS = (1.0, 1.25, CLEAR_SCORE, 2.0, 3.0), (1.0, CLEAR_MARGIN, 1.5, 1
 
 
 @dataclass(kw_only=True)
-class ClearPairs(Kept):
+class ClearPairs:
     """All pairs of sets, searched quickly; of the first sets thoroughly too."""
 
     num_sets: int = NUM_SETS

@@ -35,6 +35,7 @@ from scanweld.io.depth.intrinsics import read_intrinsics
 from scanweld.io.pose_formats import match_all_poses, read_any_poses
 from scanweld.io.read import part_names
 from scanweld.io.scan_formats.registry import format_of
+from scanweld.work.stage_log import peak_memory_mb
 
 FLOORS = {"seconds": 5.0, "megabytes": 1024.0}
 """That a file of a few kilobytes may take, and the memory that all of a format's may."""
@@ -114,15 +115,8 @@ def fuzz(name: str, count: int, seed: int) -> Json:
                 slowest = max(slowest, time.process_time() - begin)
     return {
         **{"name": name, "files": count, "read": num_read, "wrong": wrong},
-        **{"seconds": slowest, "megabytes": peak_megabytes()},
+        **{"seconds": slowest, "megabytes": peak_memory_mb()},
     }
-
-
-def peak_megabytes() -> float:
-    """The most memory that this process has had at a time."""
-    import resource
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def by_format(records: Sequence[Json]) -> Json:

@@ -38,10 +38,6 @@ COMPARED = (
 _log = logging.getLogger(__name__)
 
 
-class Kept:
-    """A table of units whose page is written by its blocks."""
-
-
 def add_options(
     parser: argparse.ArgumentParser, processes: str, name: str
 ) -> argparse.ArgumentParser:

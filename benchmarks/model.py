@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.blocks import rendered
+from benchmarks.captures import parser_of
 from benchmarks.results import Json, write_results
 from benchmarks.run import timed
 from benchmarks.sets import OBJECTS, data_folder
@@ -72,15 +73,9 @@ QUICK = Size(num_views=6, footprint=0.008, num_samples=8000, many=3, many_pixels
 
 def main() -> int:
     """Measure; print the tables."""
-    parser = argparse.ArgumentParser(description="How good the fused model is.")
     kinds = {"virtual": virtual, "real": real, "many": many}
-    add = parser.add_argument
-    add("--kinds", nargs="+", choices=list(kinds), default=list(kinds))
-    add("--quick", action="store_true", help="small, of an object that it makes")
-    add("--data", type=Path, help="folder of the Stanford data")
-    add("--workers", type=int, default=2)
-    add("--out", type=Path, help="JSON file of all records")
-    add("--fuse", nargs=2, type=Path, metavar=("SCANS", "TOLD"))
+    parser = parser_of("How good the fused model is.", "kind", kinds)
+    parser.add_argument("--fuse", nargs=2, type=Path, metavar=("SCANS", "TOLD"))
     options = parser.parse_args()
     if options.fuse:
         fuse_folder(options.fuse[0], options.fuse[1], options.workers)

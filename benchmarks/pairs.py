@@ -11,7 +11,6 @@ the reference, at the centroid of the scan that is moved; it is near within 10 d
 percent. Overlaps are those of the data's overlaps.csv.
 """
 
-import argparse
 import sys
 import time
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.blocks import rendered
+from benchmarks.captures import parser_of
 from benchmarks.results import Json, write_results
 from benchmarks.scores import Stated
 from benchmarks.sets import OBJECTS, PairSet, data_folder, made_pairs, moved_scans, real_pairs
@@ -46,15 +46,10 @@ MIN_AUC = 0.97
 
 def main() -> int:
     """Register all pairs; 0 if the floors are met, else 1."""
-    parser = argparse.ArgumentParser(description="Register pairs of real scans from any start.")
+    parser = parser_of("Register pairs of real scans from any start.", "object", OBJECTS)
     add = parser.add_argument
-    add("--objects", nargs="+", choices=list(OBJECTS), default=list(OBJECTS))
-    add("--quick", action="store_true", help="a few pairs of a made object")
     add("--seeds", type=int, default=1, help="number of random frames of each scan")
-    add("--workers", type=int, default=2)
     add("--keypoints", nargs="+", choices=KEYPOINTS, default=["mixed"])
-    add("--data", type=Path, help="folder of the Stanford data")
-    add("--out", type=Path, help="JSON file of all answers")
     add("--plot", type=Path, help="PNG file, of the last kind of keypoints")
     options = parser.parse_args()
     data = data_folder(options.data)

@@ -16,19 +16,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from importlib import import_module
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks import fuzz
 from benchmarks.results import DATA, Json, read_results, write_results
-from benchmarks.sample_files import pcd_head
+from benchmarks.sample_files import e57_of, las_of, npy, npz, pcd_head
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.io import read_scan
 from scanweld.io.mesh_write import glb_bytes, stl_bytes
+from scanweld.work.stage_log import peak_memory_mb
 
 ROWS, COLUMNS = 1000, 2000
 MOST_SECONDS = 2.0
@@ -79,31 +78,17 @@ def _pcd(*, is_compressed: bool) -> bytes:
 
 
 def _e57() -> bytes:
-    pye57 = import_module("pye57")
     rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
     table = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points().T.copy(), strict=True))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "a.e57"
-        file = pye57.E57(str(path), mode="w")
-        file.write_scan_raw({**table, "rowIndex": rows, "columnIndex": columns}, name="one")
-        file.close()
-        return path.read_bytes()
+    return e57_of(one=({**table, "rowIndex": rows, "columnIndex": columns}, {}))
 
 
 def _las(*, is_packed: bool) -> bytes:
-    laspy = import_module("laspy")
-    header = laspy.LasHeader(point_format=0, version="1.2")
-    header.scales = np.full(3, 1e-5)
-    found, stream = laspy.LasData(header), BytesIO()
-    found.xyz = points()
-    found.write(stream, do_compress=is_packed)
-    return stream.getvalue()
+    return las_of(points(), 1e-5, np.zeros(3), is_packed=is_packed)
 
 
-def _numpy(save: Callable[..., None]) -> bytes:
-    stream = BytesIO()
-    save(stream, points().reshape(ROWS, COLUMNS, 3))
-    return stream.getvalue()
+def _grid() -> FloatArray:
+    return points().reshape(ROWS, COLUMNS, 3)
 
 
 def _vtk() -> bytes:
@@ -126,8 +111,8 @@ FILES: dict[str, Callable[[], bytes]] = {
     "grid.e57": _e57,
     "points.las": lambda: _las(is_packed=False),
     "points.laz": lambda: _las(is_packed=True),
-    "grid.npy": lambda: _numpy(np.save),
-    "grid.npz": lambda: _numpy(np.savez_compressed),
+    "grid.npy": lambda: npy(_grid()),
+    "grid.npz": lambda: npz(points=_grid()),
     "grid.vtk": _vtk,
     "mesh.glb": lambda: glb_bytes(_mesh()),
     "mesh.stl": lambda: stl_bytes(_mesh()),
@@ -143,12 +128,12 @@ def measured(path: Path) -> Json:
         small = path.with_name(f"small{path.suffix}")
         small.write_bytes(fuzz.samples()[WARM[path.name]]())
         read_scan(small)
-    before, begin = fuzz.peak_megabytes(), time.process_time()
+    before, begin = peak_memory_mb(), time.process_time()
     count = len(read_scan(path).points)
     seconds = time.process_time() - begin
     return {
         **{"name": path.name, "points": count, "size": path.stat().st_size / 1e6},
-        **{"seconds": seconds, "megabytes": fuzz.peak_megabytes() - before},
+        **{"seconds": seconds, "megabytes": peak_memory_mb() - before},
     }
 
 

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from benchmarks.sample_texts import SCANS
 from scanweld.geometry.arrays import ByteArray, FloatArray
 
+Columns = dict[str, NDArray]
+
 ROWS, COLUMNS = 6, 7
 HOLES = ((0, 0), (3, 4))
 GROUND = np.array([[0, -1, 0, 10], [1, 0, 0, 20], [0, 0, 1, -3], [0, 0, 0, 1]], dtype=np.float64)
@@ -173,17 +175,10 @@ def depth_image(kind: str, *, is_float: bool = False) -> bytes:
     return stream.getvalue()
 
 
-def depth_npz() -> bytes:
-    """Depths in millimetres, as NumPy saves them."""
+def npz(**arrays: NDArray) -> bytes:
+    """Arrays by their names as NumPy saves them."""
     stream = BytesIO()
-    np.savez_compressed(stream, depth=np.rint(1000 * np.nan_to_num(surface()[..., 2])))
-    return stream.getvalue()
-
-
-def npz() -> bytes:
-    """Points as a grid, with colours."""
-    stream = BytesIO()
-    np.savez_compressed(stream, points=surface(), colors=colors().reshape(ROWS, COLUMNS, 3))
+    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # no flag among them
     return stream.getvalue()
 
 
@@ -244,35 +239,48 @@ def glb() -> bytes:
 
 
 def e57() -> bytes:
-    """Two scans as pye57 writes them, the second with a pose."""
-    pye57 = import_module("pye57")
-
+    """Two scans, the second with a pose."""
     rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
     points, seen = surface().reshape(-1, 3), np.isfinite(surface()).all(axis=2).ravel()
     table = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), points[seen].T, strict=True))
     table |= {"rowIndex": rows[seen], "columnIndex": columns[seen]}
     table |= zip(("colorRed", "colorGreen", "colorBlue"), colors()[seen].T, strict=True)
+    half = np.array([0.5**0.5, 0, 0, 0.5**0.5])
+    turned = {"rotation": half, "translation": GROUND[:3, 3]}
+    return e57_of(left=(table, {}), right=(table, turned))
+
+
+def e57_of(**scans: tuple[Columns, Columns]) -> bytes:
+    """Scans by their names, each with its columns and its pose, as pye57 writes them."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.e57"
-        file = pye57.E57(str(path), mode="w")
-        half = np.array([0.5**0.5, 0, 0, 0.5**0.5])
-        file.write_scan_raw(table, name="left")
-        file.write_scan_raw(table, name="right", rotation=half, translation=GROUND[:3, 3])
+        file = import_module("pye57").E57(str(path), mode="w")
+        for name, (table, pose) in scans.items():
+            file.write_scan_raw(table, name=name, **pose)
         file.close()
         return path.read_bytes()
 
 
 def las(*, is_packed: bool) -> bytes:
-    """Points as laspy writes them, at map coordinates in hundredths."""
-    laspy = import_module("laspy")
+    """At map coordinates in hundredths, with colours."""
+    origin = np.array([4e6, 5e5, 0])
+    points = np.nan_to_num(np.round(surface(), 2)).reshape(-1, 3) + origin
+    channels = (colors().astype(np.uint16) * 257).T
+    shades = dict(zip(("red", "green", "blue"), channels, strict=True))
+    return las_of(points, 0.01, origin, is_packed=is_packed, **shades)
 
-    header = laspy.LasHeader(point_format=2, version="1.2")
-    header.offsets, header.scales = np.array([4e6, 5e5, 0]), np.full(3, 0.01)
-    found = laspy.LasData(header)
-    found.xyz = np.nan_to_num(np.round(surface(), 2)).reshape(-1, 3) + header.offsets
-    for name, channel in zip(("red", "green", "blue"), colors().T, strict=True):
-        setattr(found, name, channel.astype(np.uint16) * 257)
-    stream = BytesIO()
+
+def las_of(
+    points: FloatArray, scale: float, origin: FloatArray, *, is_packed: bool, **shades: NDArray
+) -> bytes:
+    """Points (N, 3) in steps of a scale as laspy writes them."""
+    laspy = import_module("laspy")
+    header = laspy.LasHeader(point_format=2 if shades else 0, version="1.2")
+    header.offsets, header.scales = origin, np.full(3, scale)
+    found, stream = laspy.LasData(header), BytesIO()
+    found.xyz = points
+    for name, channel in shades.items():
+        setattr(found, name, channel)
     found.write(stream, do_compress=is_packed)
     return stream.getvalue()
 
@@ -287,7 +295,7 @@ SAMPLES: dict[str, Callable[[], bytes]] = {
     "binary.stl": stl,
     "packed.pcd.gz": lambda: gzip.compress(pcd_binary(), mtime=0),
     "grid.npy": lambda: npy(surface()),
-    "grid.npz": npz,
+    "grid.npz": lambda: npz(points=surface(), colors=colors().reshape(ROWS, COLUMNS, 3)),
     "ascii.vtk": lambda: vtk(is_binary=False),
     "binary.vtk": lambda: vtk(is_binary=True),
     "nodes.glb": glb,
@@ -300,7 +308,7 @@ DEPTH_IMAGES: dict[str, Callable[[], bytes]] = {
     "a.tif": lambda: depth_image("TIFF"),
     "float.tif": lambda: depth_image("TIFF", is_float=True),
     "a.npy": lambda: npy(np.nan_to_num(surface()[..., 2])),
-    "a.npz": depth_npz,
+    "a.npz": lambda: npz(depth=np.rint(1000 * np.nan_to_num(surface()[..., 2]))),
 }
 """those of depth images,"""
 WITH_LIBRARIES: dict[str, tuple[str, Callable[[], bytes]]] = {

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from benchmarks.study.plots import GRID, save, subplots
+from benchmarks.study.plots import plain, save, subplots
 from scanweld.geometry.arrays import BoolArray, FloatArray
 
 NUM_BINS = 12
@@ -124,7 +124,6 @@ def draw(stated: Mapping[str, Stated], folder: Path, name: str) -> None:
 
 
 def _save(figure: Any, axes: Any, path: Path) -> None:
-    axes.grid(**GRID)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain(axes)
     axes.legend(frameon=False)
     save(figure, path)

@@ -1,18 +1,8 @@
-"""Meshes put together, and what is asked of their edges."""
+"""What is asked of the edges of meshes."""
 
 import numpy as np
 
 from scanweld.geometry.arrays import IntArray
-from scanweld.geometry.mesh import TriangleMesh
-
-
-def joined(*meshes: TriangleMesh) -> TriangleMesh:
-    """Several meshes as one."""
-    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    return TriangleMesh(
-        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-        faces=np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=True)]),
-    )
 
 
 def edges_of(faces: IntArray) -> tuple[IntArray, IntArray]:

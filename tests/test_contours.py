@@ -29,6 +29,7 @@ from scanweld.contours.prune import (
 )
 from scanweld.evaluation.primitives import sphere
 from scanweld.evaluation.scanner import scan_mesh
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -36,7 +37,6 @@ from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.preparation import prepare
 from scanweld.published.mm_icc import mm_icc
 from scanweld.published.outer_loop import ContourAlignment
-from tests.meshes import joined
 from tests.prepared import PreparedPair, creature_pair
 
 MODELS = [CameraModel.PINHOLE, CameraModel.ORTHOGRAPHIC]

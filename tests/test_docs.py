@@ -96,7 +96,7 @@ def test_report_page_gives_the_limits_of_the_code():
         f"{100 * rivals.RIVAL_SHIFT_DIAMETERS:g} % of the diameter away",
         f"The limits of a distinct pose are {rivals.RIVAL_ANGLE_DEG:g} degrees and "
         f"{100 * rivals.RIVAL_SHIFT_DIAMETERS:g} % of the diameter",
-        f"turn by more than {turntable.MIN_TURN_DEG:g} degrees",
+        f"turn by more than {turntable.RULE.min_turn_deg:g} degrees",
         f"agree on less than {MIN_AGREE:g}",
         f"more than {MAX_SCORE_LOSS:g} of their mean score",
         f"less than {'twice' if OUTWEIGHED == 2 else OUTWEIGHED} that pair's",

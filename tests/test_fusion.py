@@ -13,6 +13,7 @@ from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.primitives import plate, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
+from scanweld.evaluation.turntable import joined
 from scanweld.fusion import fuse
 from scanweld.fusion.cases import edge_corners, triangle_table
 from scanweld.fusion.surface import extract_surface
@@ -23,7 +24,7 @@ from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.shading import render_shaded, side_by_side, write_png
 from scanweld.preparation import prepare
-from tests.meshes import edges_of, is_closed, joined
+from tests.meshes import edges_of, is_closed
 from tests.posed_scans import RADIUS, Posed, off_sphere, scanned, views_of
 
 CONFIG = FusionConfig()

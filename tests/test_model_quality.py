@@ -10,6 +10,7 @@ import pytest
 from benchmarks.surface.surface_defects import surface_defects
 from scanweld.config import FusionConfig, PrepareConfig
 from scanweld.evaluation.primitives import plate, sphere
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import view_of
 from scanweld.fusion import fuse, voxel_edge
 from scanweld.fusion.agreement import Agreement
@@ -22,7 +23,7 @@ from scanweld.geometry.mesh import TriangleMesh, border_edges, face_normals, smo
 from scanweld.geometry.pose import Pose
 from scanweld.io import read_mesh, write_mesh_ply
 from scanweld.preparation import prepare
-from tests.meshes import is_closed, joined
+from tests.meshes import is_closed
 from tests.posed_scans import RADIUS, Posed, off_sphere, one_scan, scanned, views_of
 
 APART = np.array([32.0, 0.0, 0.0])

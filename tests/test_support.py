@@ -9,6 +9,7 @@ import trimesh
 from scanweld.config import Config, PrepareConfig
 from scanweld.evaluation.primitives import box, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.prepared import PreparedScan
@@ -20,7 +21,6 @@ from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
 from scanweld.work.progress import Event, NoCache, StageAdvanced, silent
 from scanweld.work.stage_log import Stages
-from tests.meshes import joined
 from tests.scenes import small_creature
 
 NOISE = NoiseModel(depth_diameters=2e-4)

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.calibration.scenes import make_set
 from benchmarks.judging.trial import is_right_pair
-from benchmarks.kept import Kept, Result, Unit
+from benchmarks.kept import Result, Unit
 from benchmarks.virtual.scene import Scene
 from scanweld.config import Config, FusionConfig
 from scanweld.errors import ScanweldError
@@ -28,12 +28,11 @@ SAME_ANSWER = Limits(RIVAL_ANGLE_DEG, 100.0 * RIVAL_SHIFT_DIAMETERS)
 
 
 @dataclass(kw_only=True)
-class Sets(Kept):
+class Sets:
     """The sets by seed."""
 
     num_sets: int = NUM_SETS
     NAME: str = "calibration"
-    TITLE: str = "Calibration of the confidence"
 
     def units(self, quick: bool) -> list[Unit]:
         """All sets; a few if quick."""

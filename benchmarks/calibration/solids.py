@@ -7,8 +7,9 @@ import trimesh
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from benchmarks.virtual.bodies import Body, Profile, Rng, joined, toothed
+from benchmarks.virtual.bodies import Body, Profile, Rng, toothed
 from scanweld.evaluation.primitives import lathe
+from scanweld.evaluation.turntable import joined
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import random_rotation

@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.judging.outcomes import Outcome, stated_pairs
 from benchmarks.judging.trial import CONFIG, QUICK, is_right_pair, seeded
-from benchmarks.kept import Kept, Record, Result, Unit
+from benchmarks.kept import Record, Result, Unit
 from benchmarks.paper.baselines.fpfh import fpfh_ransac
 from benchmarks.paper.baselines.kiss import kiss_gicp
 from benchmarks.paper.baselines.records import Method, ScanPair
@@ -34,12 +34,11 @@ TITLES = {
 
 
 @dataclass(kw_only=True)
-class OtherTools(Kept):
+class OtherTools:
     """Pairs of the scans of some runs, registered by other tools."""
 
     first_seed: int = FIRST_FRESH
     NAME: str = "rivals"
-    TITLE: str = "Other tools"
 
     def units(self, quick: bool) -> list[Unit]:
         """Scenario by scenario and seed by seed."""

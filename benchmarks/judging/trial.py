@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.judging.outcomes import CRASH, ERROR, Outcome, PairOutcome, ScanOutcome
-from benchmarks.kept import Kept, Result, Unit
+from benchmarks.kept import Result, Unit
 from benchmarks.seeds import FIRST_FRESH
 from benchmarks.virtual.scenarios import SCENARIOS
 from benchmarks.virtual.scene import Scene, make_scene
@@ -35,7 +35,7 @@ QUICK: Mapping[str, int] = {"64 pixels across": 1}
 
 
 @dataclass(kw_only=True)
-class Runs(Kept):
+class Runs:
     """Runs of scenarios by seeds, as units that are kept when done."""
 
     scenarios: Sequence[str] = tuple(SCENARIOS)  # Names
@@ -43,7 +43,6 @@ class Runs(Kept):
     first_seed: int = FIRST_FRESH  # The first seed of each
     times: int = 1  # As many runs as the scenarios ask for
     NAME: str = "trust"
-    TITLE: str = "Trust"
 
     def units(self, quick: bool) -> list[Unit]:
         """Scenario by scenario and seed by seed; one of a few if quick."""

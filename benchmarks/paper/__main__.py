@@ -24,7 +24,7 @@ from scanweld.errors import InputError, ScanweldError
 
 TABLES = ("table1", "table2", "real_pairs", "features", "ablations", "basins", "figures")
 """In the order in which they are measured and shown; each is a module of this folder."""
-_MODULES = ("views", "real", "heat_field", "settings", "methods", "baselines/*", "{table}*")
+_MODULES = ("views", "heat_field", "settings", "methods", "baselines/*", "{table}*")
 MEASURING = (
     *(PACKAGE, "benchmarks/paper/study.toml"),
     *(f"benchmarks/paper/{name}.py" for name in _MODULES),

@@ -8,9 +8,8 @@ from scipy.spatial import KDTree
 from benchmarks.paper import ablations_search as search
 from benchmarks.paper.baselines.feature_views import is_seen
 from benchmarks.paper.baselines.own import aligned, coarse_pose, jointly_refined, right_matches
-from benchmarks.paper.real import real_pair
 from benchmarks.paper.settings import REPEATED_DIAMETERS, RIGHT_DIAMETERS, STUDY
-from benchmarks.paper.views import MADE, KnownPair, overlap_of, pair_units, virtual_pair
+from benchmarks.paper.views import MADE, KnownPair, overlap_of, pair_units, real_pair, virtual_pair
 from benchmarks.study.study import Result, Unit
 from scanweld.config import ContoursConfig, HeatConfig
 from scanweld.contours.coherence import contour_pair

@@ -10,6 +10,7 @@ import numpy as np
 from trimesh.creation import icosphere
 
 from benchmarks.study.optional import need
+from scanweld.evaluation.turntable import joined
 from scanweld.geometry.arrays import ByteArray, FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh, face_normals
@@ -123,9 +124,8 @@ def _enlarged(camera: Camera, points: FloatArray, size: tuple[int, int], margin:
 
 def render(meshes: Sequence[TriangleMesh], look: Look) -> ByteArray:
     """The picture (H, W, 3) of coloured meshes in one frame."""
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
-    faces = np.concatenate([m.faces + start for m, start in zip(meshes, starts, strict=True)])
-    points = look.picture_from_world.apply(np.concatenate([m.vertices for m in meshes]))
+    whole = joined(*meshes)
+    faces, points = whole.faces, look.picture_from_world.apply(whole.vertices)
     normals = [m.normals if m.normals is not None else np.nan * m.vertices for m in meshes]
     turned = look.picture_from_world.turn(np.concatenate(normals))
     colors = np.concatenate([m.colors for m in meshes if m.colors is not None]).astype(float)

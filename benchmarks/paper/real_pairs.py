@@ -3,8 +3,15 @@
 import zlib
 
 from benchmarks.paper.methods import METHODS, need_all, try_methods
-from benchmarks.paper.real import real_pair
-from benchmarks.paper.views import MADE, KnownPair, data_file, known_pair, overlap_of, virtual_scan
+from benchmarks.paper.views import (
+    MADE,
+    KnownPair,
+    data_file,
+    known_pair,
+    overlap_of,
+    real_pair,
+    virtual_scan,
+)
 from benchmarks.sets import OBJECTS, overlaps_of
 from benchmarks.study.study import Result, Unit
 

@@ -1,4 +1,4 @@
-"""Virtual scans of the study's objects, pairs whose truth is known, starts and errors."""
+"""Virtual and real scans of the study's objects, pairs whose truth is known, starts and errors."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,19 +10,20 @@ from typing import Any
 import numpy as np
 
 from benchmarks.paper.baselines.records import ScanPair
-from benchmarks.sets import data_folder
+from benchmarks.sets import data_folder, moved_scans
 from benchmarks.study.study import Unit
 from scanweld.config import PrepareConfig
 from scanweld.errors import InputError
 from scanweld.evaluation.creature import creature
+from scanweld.evaluation.metrics import object_diameter
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import Axis, View, overlap, view_of
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, random_rotation, rotation_exp
 from scanweld.geometry.prepared import PreparedScan
-from scanweld.geometry.scan import principal_diameter
-from scanweld.io import read_mesh
+from scanweld.geometry.scan import RangeScan, principal_diameter
+from scanweld.io import read_mesh, read_poses, read_scan
 from scanweld.preparation import prepare
 
 OBJECTS = ("armadillo", "bunny")
@@ -32,6 +33,9 @@ PIXELS = 240.0
 """Across the object's diameter, as in the study on which the design rests."""
 UP: dict[str, Axis] = {"armadillo": "y", "bunny": "y", MADE: "z"}
 """The axis that the views of an object go around."""
+
+REAL_SEED = 0
+"""Of the frames that real scans are given in."""
 
 Error = dict[str, float | None]
 """By how many degrees a pose is off ("deg"), and "percent" of the diameter; None without a pose."""
@@ -148,6 +152,37 @@ def virtual_pair(name: str, azimuth: float, gap: float, noise: float = 0.0) -> K
     """Two scans of an object, a gap apart; the noise of the second has another seed."""
     i = virtual_scan(name, float(azimuth), noise=noise)
     return known_pair(i, virtual_scan(name, float(azimuth + gap), noise=noise, seed=int(noise > 0)))
+
+
+def real_pair(folder: str, names: tuple[str, ...], i: str, j: str) -> KnownPair:
+    """Two scans of an object by their names.
+
+    With ``names`` these scans are disguised by random motions and quarter turns of their grids;
+    without any, all scans stay in the frames of their files.
+    """
+    _, world_from_scan, diameter = _scans(folder, names)
+    a, b = (_prepared(folder, names, name) for name in (i, j))
+    world_from_a = world_from_scan[i] @ a.scan_from_sensor
+    world_from_b = world_from_scan[j] @ b.scan_from_sensor
+    return KnownPair(i=a, j=b, true=world_from_a.inverse() @ world_from_b, diameter=diameter)
+
+
+@lru_cache(maxsize=2)
+def _scans(
+    folder: str, names: tuple[str, ...]
+) -> tuple[dict[str, RangeScan], dict[str, Pose], float]:
+    """The scans, their reference poses, and the diameter of the object."""
+    poses = dict(read_poses(data_file(f"{folder}/poses.json")).poses)
+    chosen = names or sorted(poses)
+    scans = [read_scan(data_file(f"{folder}/{name}.ply")) for name in chosen]
+    if names:
+        scans, poses = moved_scans(scans, poses, REAL_SEED, any_rotation=True, turn_grids=True)
+    return {scan.name: scan for scan in scans}, poses, object_diameter(scans, poses)
+
+
+@lru_cache(maxsize=32)
+def _prepared(folder: str, names: tuple[str, ...], name: str) -> PreparedScan:
+    return prepare(_scans(folder, names)[0][name], PrepareConfig())
 
 
 @lru_cache(maxsize=1024)

@@ -32,6 +32,12 @@ def subplots(*shape: int, **settings: Any) -> tuple[Any, Any]:
     return need("matplotlib.pyplot").subplots(*shape, **settings)
 
 
+def plain(axes: Any) -> None:
+    """Axes with a faint grid and no box."""
+    axes.grid(**GRID)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
 def save(figure: Any, path: Path, rect: Sequence[float] = (0, 0, 1, 1), **how: Any) -> None:
     """Write a figure, without space around its contents but what the rectangle leaves."""
     figure.tight_layout(rect=rect)
@@ -67,6 +73,5 @@ def _drawn(axes: Any, panel: Panel) -> dict[str, Any]:
             [lines[title]] = axes.plot(*xy, **style)
     axes.set(title=panel.title, ylim=(-4, 104))
     axes.set_xticks(list(panel.ticks), list(panel.ticks.values()))
-    axes.grid(**GRID)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain(axes)
     return lines

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import reduce
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -12,8 +11,8 @@ from benchmarks.results import Json
 from benchmarks.surface.open3d_fusion import Shape, poisson, shape_of, tsdf
 from benchmarks.surface.surface_defects import surface_defects
 from benchmarks.surface.surface_distances import sample_surface, surface_distances
-from benchmarks.virtual.bodies import joined
 from scanweld.config import FusionConfig
+from scanweld.evaluation.turntable import joined
 from scanweld.fusion import fuse, voxel_edge
 from scanweld.geometry.arrays import BoolArray, FloatArray, IntArray
 from scanweld.geometry.gauss_newton import damped, jacobian, motion_of, spread_of, tukey_weights
@@ -72,7 +71,7 @@ def compared(subject: Subject, workers: int, rivals: Mapping[str, Rival]) -> lis
         seconds[name] = time.perf_counter() - start
     laid = {name: subject.distances(mesh) for name, mesh in models.items()}
     meshes = [TriangleMesh(vertices=s.world_points, faces=s.mesh.faces) for s in shapes]
-    models["single scans"], laid["single scans"] = reduce(joined, meshes), _single(subject, meshes)
+    models["single scans"], laid["single scans"] = joined(*meshes), _single(subject, meshes)
     reach = COMMON_RESOLUTIONS * subject.resolution
     common = np.all([from_seen <= reach for _, from_seen in laid.values()], axis=0)
     records = [fidelity(subject, models["scanweld"])]

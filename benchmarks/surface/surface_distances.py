@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.spatial import KDTree
+from trimesh.triangles import closest_point
 
 from scanweld.geometry.arrays import FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, face_normals
@@ -61,17 +62,4 @@ def _distances(
 
 def distance_to_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Distance (N,) of each point (N, 3) from its own triangle (N, 3 corners, 3)."""
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    best = np.full(len(points), np.inf)
-    inside = length > 0
-    for k in range(3):
-        a, b = triangles[:, k], triangles[:, (k + 1) % 3]
-        along = b - a
-        length2 = np.maximum(np.einsum("nk,nk->n", along, along), np.finfo(float).tiny)
-        t = np.clip(np.einsum("nk,nk->n", points - a, along) / length2, 0, 1)
-        best = np.minimum(best, np.linalg.norm(points - a - t[:, None] * along, axis=1))
-        inside &= np.einsum("nk,nk->n", np.cross(along, points - a), normal) >= 0
-    unit = normal / np.maximum(length, np.finfo(float).tiny)[:, None]
-    height = np.abs(np.einsum("nk,nk->n", points - triangles[:, 0], unit))
-    return np.where(inside, height, best)
+    return np.linalg.norm(points - closest_point(triangles, points), axis=1)

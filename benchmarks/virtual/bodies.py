@@ -10,6 +10,7 @@ import trimesh
 from benchmarks.virtual.brackets import bracket
 from scanweld.evaluation.creature import creature
 from scanweld.evaluation.primitives import box, cylinder, lathe, plate, sphere
+from scanweld.evaluation.turntable import joined
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 
@@ -37,14 +38,6 @@ class Body(NamedTuple):
 def make_body(name: str, seed: int) -> Body:
     """One of ``BODIES`` by its name, another one for every seed."""
     return BODIES[name](seed)
-
-
-def joined(one: TriangleMesh, other: TriangleMesh) -> TriangleMesh:
-    """Two meshes as one, the first's faces first, without colours."""
-    return TriangleMesh(
-        vertices=np.concatenate([one.vertices, other.vertices]),
-        faces=np.concatenate([one.faces, other.faces + len(one.vertices)]),
-    )
 
 
 def shifted(mesh: TriangleMesh, shift: FloatArray) -> TriangleMesh:

@@ -28,12 +28,17 @@ def with_depth(scan: RangeScan, depth: FloatArray) -> RangeScan:
     return replace(scan, points=points, grid=grid, colors=None)
 
 
+def points_in(scan: RangeScan, pixels: BoolArray) -> BoolArray:
+    """Which points (N,) some pixels (H, W) saw."""
+    assert scan.grid is not None
+    is_in = np.zeros(len(scan.points), dtype=bool)
+    is_in[scan.grid[pixels & (scan.grid >= 0)]] = True
+    return is_in
+
+
 def only_pixels(scan: RangeScan, kept: BoolArray) -> RangeScan:
     """The scan with what some pixels (H, W) saw only."""
-    assert scan.grid is not None
-    is_kept = np.zeros(len(scan.points), dtype=bool)
-    is_kept[scan.grid[kept & (scan.grid >= 0)]] = True
-    return scan.only(is_kept)
+    return scan.only(points_in(scan, kept))
 
 
 def silhouette(depth: FloatArray) -> BoolArray:

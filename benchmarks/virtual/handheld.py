@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from benchmarks.virtual.bodies import Rng, joined, shifted
+from benchmarks.virtual.bodies import Rng, shifted
 from scanweld.evaluation.primitives import box, cylinder, sphere
+from scanweld.evaluation.turntable import joined
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.camera import Camera, CameraModel
 from scanweld.geometry.mesh import TriangleMesh
@@ -136,7 +137,7 @@ def room(rng: Rng, size: tuple[float, float, float] = (4.0, 3.5, 2.5)) -> Triang
         spin = rotation_exp(rng.uniform(0, np.pi) * UP)
         place = np.array([(x / 2 - 0.3) * np.cos(turn), (y / 2 - 0.3) * np.sin(turn), c / 2])
         sides.append(shifted(replace(thing, vertices=thing.vertices @ spin.T), place))
-    return together(sides)
+    return joined(*sides)
 
 
 def table_with(body: TriangleMesh, size: float, height: float = 0.75) -> TriangleMesh:
@@ -150,10 +151,7 @@ def table_with(body: TriangleMesh, size: float, height: float = 0.75) -> Triangl
 
 def together(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     """Several meshes as one."""
-    whole = meshes[0]
-    for mesh in meshes[1:]:
-        whole = joined(whole, mesh)
-    return whole
+    return joined(*meshes)
 
 
 def exact_depth(scene: TriangleMesh, world_from_camera: Pose, camera: Camera) -> FloatArray:

@@ -1,20 +1,19 @@
 """What does not move with the object: a room that stands still around it, a lid that is opened."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.virtual.bodies import Body, Rng, joined, middle, shifted
-from benchmarks.virtual.scenery import UP, take_beside
+from benchmarks.virtual.bodies import Body, Rng, middle, shifted
+from benchmarks.virtual.scenery import UP, pixels_of, take_beside
 from benchmarks.virtual.shots import JITTER_DEG, Shot
 from scanweld.evaluation.primitives import box, cylinder
 from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import View, camera_axes, view_along
-from scanweld.geometry.arrays import BoolArray, FloatArray
+from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, rotation_exp
-from scanweld.geometry.rasterize import render_depth
 from scanweld.geometry.scan import principal_diameter
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 230.0
@@ -67,7 +66,7 @@ def in_standing_room(body: Body, views: list[View], noise: NoiseModel, seed: int
     moved = [view.world_from_sensor @ first.inverse() for view in views]
     rooms = [TriangleMesh(vertices=m.apply(room.vertices), faces=room.faces) for m in moved]
     shots = take_beside(body, rooms, views, noise, seed, frame=lambda view: view)
-    masks = [_pixels_of(body, *beside) for beside in zip(rooms, views, strict=True)]
+    masks = [pixels_of(body, *beside)[0] for beside in zip(rooms, views, strict=True)]
     return [replace(shot, mask=mask) for shot, mask in zip(shots, masks, strict=True)]
 
 
@@ -99,7 +98,7 @@ def _room(body: Body, world_from_sensor: Pose, rng: Rng) -> TriangleMesh:
         way = np.array([1.0, 0.0, 0.0]) @ _towards(ahead, aside)
         place = ground + size * rng.uniform(*CLUTTER_AWAY) * way
         parts.append(shifted(_thing(size, rng), place))
-    return _together(parts)
+    return joined(*parts)
 
 
 def _folds(places: FloatArray, rng: Rng) -> FloatArray:
@@ -148,18 +147,3 @@ def _towards(ahead: FloatArray, turn: float) -> FloatArray:
     """Rotation about z, for rows, of x to a horizontal direction (3,), turned by radians more."""
     angle = np.arctan2(ahead[1], ahead[0]) + turn
     return rotation_exp(np.array([0.0, 0.0, angle])).T
-
-
-def _together(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
-    whole = meshes[0]
-    for mesh in meshes[1:]:
-        whole = joined(whole, mesh)
-    return whole
-
-
-def _pixels_of(body: Body, beside: TriangleMesh, view: View) -> BoolArray:
-    """Pixels (H, W) in which a view sees the body."""
-    both = joined(body.mesh, beside)
-    vertices = view.world_from_sensor.inverse().apply(both.vertices)
-    face_of = render_depth(vertices, both.faces, view.camera)[1]
-    return (face_of >= 0) & (face_of < len(body.mesh.faces))

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from benchmarks.virtual.bodies import Body, Rng, joined, middle, shifted
+from benchmarks.virtual.bodies import Body, Rng, middle, shifted
 from benchmarks.virtual.shots import Shot, Views, take
 from scanweld.evaluation.primitives import cylinder
 from scanweld.evaluation.scanner import NoiseModel
+from scanweld.evaluation.turntable import joined
 from scanweld.evaluation.views import View
-from scanweld.geometry.arrays import FloatArray
+from scanweld.geometry.arrays import BoolArray, FloatArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.pose import Pose, rotation_exp
 from scanweld.geometry.rasterize import render_depth
@@ -103,12 +104,18 @@ def take_beside(
     return shots
 
 
+def pixels_of(body: Body, beside: TriangleMesh, view: View) -> tuple[BoolArray, BoolArray]:
+    """Pixels (H, W) in which a view sees the body, and those in which it sees what is beside it."""
+    both, count = joined(body.mesh, beside), len(body.mesh.faces)
+    vertices = view.world_from_sensor.inverse().apply(both.vertices)
+    face_of = render_depth(vertices, both.faces, view.camera)[1]
+    return (face_of >= 0) & (face_of < count), face_of >= count
+
+
 def _share_beside(body: Body, scenery: TriangleMesh, view: View) -> float:
     """Share of what a view sees that is not the object."""
-    both = joined(body.mesh, scenery)
-    vertices = view.world_from_sensor.inverse().apply(both.vertices)
-    _, face_of = render_depth(vertices, both.faces, view.camera)
-    return float((face_of >= len(body.mesh.faces)).sum() / (face_of >= 0).sum())
+    own, other = pixels_of(body, scenery, view)
+    return float(other.sum() / (own | other).sum())
 
 
 def _table(body: Body, up: FloatArray) -> TriangleMesh:

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from benchmarks.virtual.bodies import Body, Rng, middle
+from benchmarks.virtual.depth_images import points_in
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.views import View, camera_axes, view_along, view_of
 from scanweld.geometry.arrays import BoolArray, FloatArray
@@ -55,10 +56,8 @@ class Shot:
     @property
     def on_object(self) -> BoolArray:
         """(N,) points that lie on the object, of a scan that still has its grid."""
-        assert self.mask is not None and self.scan.grid is not None
-        on_object = np.zeros(len(self.scan.points), dtype=bool)
-        on_object[self.scan.grid[self.mask & (self.scan.grid >= 0)]] = True
-        return on_object
+        assert self.mask is not None
+        return points_in(self.scan, self.mask)
 
     def only(self, kept: BoolArray) -> "Shot":
         """Some of the points."""

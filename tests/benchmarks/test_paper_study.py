@@ -61,16 +61,6 @@ def test_only_what_is_not_finished_is_measured(study: Study):
     assert wider.measured == [5] and told == [(2, 3), (3, 3)]
 
 
-def test_what_is_not_whole_is_measured_again_and_then_kept(study: Study):
-    records_of(study, Squares(1, 2, 3))
-    for path in sorted((study.work / "squares").glob("*.json"))[:2]:
-        path.unlink()
-    for expected in (2, 0):
-        resumed = Squares(1, 2, 3)
-        assert [r.result["square"] for r in records_of(study, resumed)] == [1, 4, 9]
-        assert len(resumed.measured) == expected
-
-
 def test_a_unit_that_fails_leaves_the_finished_ones(study: Study):
     with pytest.raises(ArithmeticError):
         records_of(study, Squares(1, 2, -1, 3))

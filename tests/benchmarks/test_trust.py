@@ -15,7 +15,7 @@ from benchmarks.judging.floors import Floor, floors, names_factor, real_sets
 from benchmarks.judging.outcomes import Outcome, PairOutcome, ScanOutcome
 from benchmarks.judging.page import Results, page_text
 from benchmarks.judging.trial import Runs, judge, try_out
-from benchmarks.kept import Record, Study, measured
+from benchmarks.kept import Record
 from benchmarks.results import DOCS
 from benchmarks.scores import Stated, bound
 from benchmarks.seeds import FIRST_FRESH
@@ -200,31 +200,7 @@ def test_outcomes_come_back_from_their_records():
     assert scan.is_good and scan.is_false and scan.rotation_deg == 9.0
 
 
-class Interrupted(Exception):
-    """Stands for a kill."""
-
-
-def test_finished_runs_are_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    true = outcome_of(CLEAN)
-    made: list[int] = []
-
-    def stub(scenario: str, seed: int) -> Outcome:
-        if len(made) == 3:
-            raise Interrupted
-        made.append(seed)
-        confident = with_confidence(true, 0.9 - 0.01 * (seed - FIRST_FRESH))
-        return replace(confident, scenario=scenario, seed=seed)
-
-    monkeypatch.setattr(trial, "try_out", stub)
-    study = Study(out=tmp_path, work=tmp_path / "w", workers=1, quick=False, command="test")
-    runs = Runs(scenarios=(CLEAN,), seeds=5)
-    with pytest.raises(Interrupted):
-        measured(runs, study)
-    made[:] = made[:1]
-    first, again = ([Outcome.of(r.unit, r.result) for r in measured(runs, study)] for _ in "ab")
-    assert made[1:] == [FIRST_FRESH + 3, FIRST_FRESH + 4] and len(first) == 5
-    assert [o.record() for o in first] == [o.record() for o in again]
-    assert f"| {CLEAN} | clean | 5 |" in told("trust-scenarios", *first)
+def test_runs_are_those_of_the_scenarios_from_the_first_fresh_seed_on():
     units = Runs(scenarios=(CLEAN, "hand"), seeds=2).units(False)
     seeds = (FIRST_FRESH, FIRST_FRESH + 1)
     assert units == [{"scenario": n, "seed": k} for n in (CLEAN, "hand") for k in seeds]

@@ -1,7 +1,8 @@
 """How many points of a scan, and how many workers, there is room for under a budget of memory."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from scanweld.errors import BudgetError
@@ -10,27 +11,43 @@ MEGABYTE = 2**20
 _UNITS = {"": MEGABYTE, "m": MEGABYTE, "mb": MEGABYTE, "g": 2**30, "gb": 2**30}
 _SIZE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([a-z]*)\s*", re.IGNORECASE)
 
-# Measured on runs of 2 to 20 scans of 45 thousand to a million points, and rounded up. The same on
-# all machines and for any number of workers, so that what becomes of a scan is the same, too.
-BASE = 220 * MEGABYTE
-"""What a run takes besides its scans: the interpreter, libraries, compiled kernels,"""
-FUSION = 260 * MEGABYTE
-"""and, in the end, the fusion of the model."""
-PER_SCAN = 8 * MEGABYTE
-"""A scan's range image and samples, whatever its points."""
-PER_POINT = 110
-"""A point that is kept: place, normal, colour, cell of the grid, faces."""
-PER_WORKED_POINT = 700
-"""A point of a scan that is being prepared, besides, in each worker."""
 NUM_PLANNED = 2
 """Workers that there is room for in any case."""
-READING = 30 * MEGABYTE
-"""What reading a file takes, whatever its size,"""
-PER_FILE_BYTE = {".ply": 6, ".stl": 8, ".obj": 9, ".off": 21, ".png": 200}
-PER_TEXT_BYTE = 7
-"""and for each of its bytes."""
 MIN_POINTS = 20_000
 """Scans are thinned to no fewer points: a working range image has about as many."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Needs:
+    """Bytes that a run takes, by what it takes them for.
+
+    Measured on runs of 2 to 20 scans of 45 thousand to a million points, and rounded up. The same
+    on all machines and for any number of workers, so that what becomes of a scan is the same, too.
+
+    Attributes:
+        run: Besides its scans: the interpreter, libraries, compiled kernels.
+        fusion: Of the model, in the end.
+        scan: Its range image and samples, whatever its points.
+        point: That is kept: place, normal, colour, cell of the grid, faces.
+        worked_point: Of a scan that is being prepared, besides, in each worker.
+        file: That is read, whatever its size.
+        file_byte: Each of its bytes, by suffix.
+        text_byte: Likewise of all other files.
+    """
+
+    run: int = 220 * MEGABYTE
+    fusion: int = 260 * MEGABYTE
+    scan: int = 8 * MEGABYTE
+    point: int = 110
+    worked_point: int = 700
+    file: int = 30 * MEGABYTE
+    file_byte: Mapping[str, int] = field(
+        default_factory=lambda: {".ply": 6, ".stl": 8, ".obj": 9, ".off": 21, ".png": 200}
+    )
+    text_byte: int = 7
+
+
+NEEDS = Needs()
 
 
 def parse_size(text: str) -> int:
@@ -52,13 +69,13 @@ def points_within(budget: int, files: Sequence[Path]) -> int:
         BudgetError: If that is too little to work with.
     """
     n = max(len(files), 1)
-    kept = BASE + PER_SCAN * n
+    kept = NEEDS.run + NEEDS.scan * n
     phases = (
-        (BASE + max(map(_reading, files), default=0), 0),
-        (kept, NUM_PLANNED * PER_WORKED_POINT),
-        (kept + FUSION, 0),
+        (NEEDS.run + max(map(_reading, files), default=0), 0),
+        (kept, NUM_PLANNED * NEEDS.worked_point),
+        (kept + NEEDS.fusion, 0),
     )
-    least = max(fixed + MIN_POINTS * (PER_POINT * n + each) for fixed, each in phases)
+    least = max(fixed + MIN_POINTS * (NEEDS.point * n + each) for fixed, each in phases)
     if budget < least:
         largest = max(map(_size, files), default=0)
         scans = f"{len(files)} scans with files of up to {-(-largest // MEGABYTE)} MB"
@@ -66,19 +83,19 @@ def points_within(budget: int, files: Sequence[Path]) -> int:
             f"--memory {budget // MEGABYTE}M: is too little for {scans}; "
             f"give at least {-(-least // MEGABYTE)}M, or fewer scans"
         )
-    return min((budget - fixed) // (PER_POINT * n + each) for fixed, each in phases)
+    return min((budget - fixed) // (NEEDS.point * n + each) for fixed, each in phases)
 
 
 def workers_within(budget: int, num_points: Sequence[int], asked: int) -> int:
     """How many scans may be prepared at a time, of so many points each: as asked, or fewer."""
-    kept = BASE + PER_SCAN * len(num_points) + PER_POINT * sum(num_points)
-    each = PER_WORKED_POINT * max(num_points, default=1)
+    kept = NEEDS.run + NEEDS.scan * len(num_points) + NEEDS.point * sum(num_points)
+    each = NEEDS.worked_point * max(num_points, default=1)
     return max(1, min(asked, (budget - kept) // each))
 
 
 def _reading(path: Path) -> int:
     """What reading a file takes for a while."""
-    return READING + _size(path) * PER_FILE_BYTE.get(path.suffix.lower(), PER_TEXT_BYTE)
+    return NEEDS.file + _size(path) * NEEDS.file_byte.get(path.suffix.lower(), NEEDS.text_byte)
 
 
 def _size(path: Path) -> int:

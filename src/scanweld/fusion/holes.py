@@ -34,20 +34,40 @@ logger = logging.getLogger(__name__)
 
 Closing = Literal["fill", "carve"]
 
-_COARSE_ACROSS = 128
-"""Nodes of the coarse grid along the longest side of the surface, at most."""
-_MIN_COARSE_VOXELS = 4.0
-"""Least spacing of the coarse nodes, in voxels."""
-_COARSE_MARGIN = 3
-"""Nodes around the surface; the outermost are outside of everything."""
-_COARSE_SWEEPS = 300
-"""Sweeps of the relaxation over the coarse grid, which has far to go,"""
-_FINE_SWEEPS = 40
-"""and over the blocks of voxels, which begin with the coarse solution."""
-_OVER_RELAXATION = 1.8
-"""Factor of successive over-relaxation; below 2, or it does not converge."""
-_MAX_ROUNDS = 3
-"""Rounds of relaxing and following the surface into new blocks; the last one only follows."""
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _CoarseGrid:
+    """How fine the coarse grid is.
+
+    Attributes:
+        across: Nodes along the longest side of the surface, at most.
+        min_voxels: Least spacing of the nodes, in voxels.
+        margin: Nodes around the surface; the outermost are outside of everything.
+    """
+
+    across: int = 128
+    min_voxels: float = 4.0
+    margin: int = 3
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Relaxation:
+    """How Laplace's equation is solved, by successive over-relaxation.
+
+    Attributes:
+        factor: Of the over-relaxation; below 2, or it does not converge.
+        coarse_sweeps: Over the coarse grid, which has far to go.
+        fine_sweeps: Over the blocks of voxels, which begin with the coarse solution.
+        rounds: Of relaxing and following the surface into new blocks; the last one only follows.
+    """
+
+    factor: float = 1.8
+    coarse_sweeps: int = 300
+    fine_sweeps: int = 40
+    rounds: int = 3
+
+
+_COARSE_GRID, _RELAXATION = _CoarseGrid(), _Relaxation()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -103,11 +123,12 @@ def closed_field(
     """
     coarse = _coarse_field(volume, images, closing, workers)
     field = _begun(volume, closing, coarse)
-    for k in range(_MAX_ROUNDS):
-        if closing == "fill" and k < _MAX_ROUNDS - 1:
+    for k in range(_RELAXATION.rounds):
+        if closing == "fill" and k < _RELAXATION.rounds - 1:
             is_fixed = ~_is_unknown(field.volume)
             nearby = field.volume.neighbours()
-            _relax_blocks(field.distance, is_fixed, nearby, _FINE_SWEEPS, _OVER_RELAXATION)
+            how = _RELAXATION.fine_sweeps, _RELAXATION.factor
+            _relax_blocks(field.distance, is_fixed, nearby, *how)
         while len(blocks := _missing_blocks(field)):
             new = empty_volume(volume.origin, volume.voxel, volume.truncation, blocks)
             add_images(new, images, depth, workers)
@@ -122,9 +143,10 @@ def _coarse_field(
     low = volume.origin + volume.voxel * BLOCK * volume.blocks.min(axis=0)
     high = volume.origin + volume.voxel * BLOCK * (volume.blocks.max(axis=0) + 1)
     extent = high - low
-    spacing = max(_MIN_COARSE_VOXELS * volume.voxel, float(extent.max()) / _COARSE_ACROSS)
-    origin = low - _COARSE_MARGIN * spacing
-    shape = np.ceil((extent / spacing + 2 * _COARSE_MARGIN + 1) / BLOCK).astype(np.int64)
+    grid = _COARSE_GRID
+    spacing = max(grid.min_voxels * volume.voxel, float(extent.max()) / grid.across)
+    origin = low - grid.margin * spacing
+    shape = np.ceil((extent / spacing + 2 * grid.margin + 1) / BLOCK).astype(np.int64)
     blocks = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3)
     # Cut off where weights end: thinner parts of an object are the fine field's business.
     truncation = DEPTH_VOXELS * spacing
@@ -138,7 +160,7 @@ def _coarse_field(
             np.moveaxis(is_unknown, axis, 0)[end] = False
     if closing == "fill":
         values[is_unknown] = 0.0
-        _relax_grid(values, ~is_unknown, _COARSE_SWEEPS, _OVER_RELAXATION)
+        _relax_grid(values, ~is_unknown, _RELAXATION.coarse_sweeps, _RELAXATION.factor)
     return _Coarse(origin=origin, spacing=spacing, values=values)
 
 

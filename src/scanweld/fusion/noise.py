@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
@@ -16,14 +16,8 @@ from scanweld.work.threads import map_in_rows
 
 logger = logging.getLogger(__name__)
 
-_NUM_POINTS = 1500
-"""Points of a scan that are compared with the others, about."""
 MIN_COMMON = 50
 """Points that two scans must have in common to be compared."""
-_REACH_PIXELS = 4.0
-"""Points farther than this from another scan's surface are not on it."""
-_MIN_COSINE = 0.5
-"""Nor are points that the other scan's sensor would see more obliquely than this (cosine)."""
 _FLOOR_PIXELS = 0.02
 """Least noise, in footprints of a pixel: normals and interpolation are no better."""
 _RIDGE = 0.02
@@ -33,6 +27,24 @@ _MAX_PRECISION = 4.0
 """Most that a scan counts for, and least if inverted, beside the median scan."""
 _GOLDEN = (0.7548776662466927, 0.5698402909980532)
 """Steps of a sequence that fills the unit square evenly (Roberts 2018)."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Comparison:
+    """Which points of a scan are held against another one's surface.
+
+    Attributes:
+        num_points: About so many.
+        reach_pixels: Points farther from that surface are not on it,
+        min_cosine: nor are those that its sensor would see more obliquely (cosine).
+    """
+
+    num_points: int = 1500
+    reach_pixels: float = 4.0
+    min_cosine: float = 0.5
+
+
+_COMPARED = _Comparison()
 
 
 def with_noise(images: Sequence[PosedImage], workers: int = 1) -> list[PosedImage]:
@@ -89,7 +101,7 @@ def _between_pixels(image: PosedImage) -> tuple[FloatArray, FloatArray]:
     inner = (image.weight > 0) & ~image.is_rim
     whole = inner[:-1, :-1] & inner[:-1, 1:] & inner[1:, :-1] & inner[1:, 1:]
     row, column = np.nonzero(whole)
-    step = max(1, len(row) // _NUM_POINTS)
+    step = max(1, len(row) // _COMPARED.num_points)
     row, column = row[::step], column[::step]
     s, t = (np.arange(len(row)) * g % 1.0 for g in _GOLDEN)
     points, normals = np.zeros((len(row), 3)), np.zeros((len(row), 3))
@@ -107,8 +119,8 @@ def _between_pixels(image: PosedImage) -> tuple[FloatArray, FloatArray]:
 
 def _spread(points: tuple[FloatArray, FloatArray], image: PosedImage) -> tuple[float, int]:
     """Robust standard deviation of the distances of points to a surface, and their number."""
-    distance, weight = sample_surface(image, *points, _MIN_COSINE)
-    near = (weight > 0) & (np.abs(distance) < _REACH_PIXELS * image.pixel)
+    distance, weight = sample_surface(image, *points, _COMPARED.min_cosine)
+    near = (weight > 0) & (np.abs(distance) < _COMPARED.reach_pixels * image.pixel)
     if not near.any():
         return 0.0, 0
     return MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), int(near.sum())

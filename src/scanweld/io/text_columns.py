@@ -10,9 +10,9 @@ from scanweld.errors import ReadError
 from scanweld.geometry.arrays import FloatArray
 from scanweld.io.raw import RawScan, noted_bytes
 from scanweld.io.text import is_any_number
+from scanweld.io.text_encoding import HEAD
 from scanweld.io.text_head import axis_name, row_cells
 
-_FIRST_LINE = slice(0, 2**16)
 INDEX_NOTE = "first column left out: it counts the points"
 
 _NAMES = {
@@ -62,7 +62,7 @@ def is_known(name: str) -> bool:
 
 def without_words(text: bytes, names: Sequence[str]) -> bytes:
     """The text with ``nan`` for the words of columns whose names are not read."""
-    first = text[_FIRST_LINE].splitlines()[:1]
+    first = text[HEAD].splitlines()[:1]
     cells = [cell for line in first for cell in row_cells(line.decode("latin-1"))]
     other = [k for k, name in enumerate(names) if not is_known(name)]
     if len(cells) != len(names) or all(is_any_number(cells[k].encode()) for k in other):

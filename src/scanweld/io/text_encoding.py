@@ -16,6 +16,8 @@ _MARKS = (
 """That of UTF-32 begins with that of UTF-16, so it is tried first."""
 BEGIN = slice(0, 400)
 """Of a file: bytes that tell what it is, and where a text would show its zero bytes."""
+HEAD = slice(0, 2**16)
+"""Of a text, in bytes: its numbers must begin there, and what separates them shows there."""
 
 
 def plain_text(path: Path, data: bytes) -> bytes:

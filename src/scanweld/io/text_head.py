@@ -9,6 +9,7 @@ from pathlib import Path
 from scanweld.errors import ReadError
 from scanweld.io.names import printable
 from scanweld.io.text import is_any_number
+from scanweld.io.text_encoding import HEAD
 
 _COMMENT = re.compile(rb"(^|\s)(#(?!N/A)|//).*$", re.DOTALL)
 """Not inside a word: some libraries print NaN as 1.#QNAN, and tables as #N/A."""
@@ -16,8 +17,6 @@ _BETWEEN = re.compile(rb'[\s,;"]+')
 _MARK = re.compile(r"^\s*(#|//|%|!)+")
 _LETTER, _DIGIT = re.compile(rb"[A-Za-z]"), re.compile(rb"\d")
 _UNIT = re.compile(r" *[\[(][^\])]*[\])]")
-_HEAD = slice(0, 2**16)
-"""Where the numbers must begin, in bytes."""
 _MOST_LINES = 5
 """Lines of words above the numbers; a file that has more is of some other format."""
 
@@ -49,7 +48,7 @@ def split_head(path: Path, text: bytes) -> tuple[Head, bytes]:
     Raises:
         ReadError: If there are no numbers, or what is above them looks like numbers too.
     """
-    lines = text[_HEAD].splitlines(keepends=True)
+    lines = text[HEAD].splitlines(keepends=True)
     head: list[bytes] = []
     words: list[bytes] = []
     names: tuple[str, ...] = ()

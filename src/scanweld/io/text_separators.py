@@ -5,6 +5,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from scanweld.errors import ReadError
+from scanweld.io.text_encoding import HEAD
 
 _BETWEEN_WORDS = re.compile(rb"[ \t](?<=[^\s,;][ \t])[ \t]*[^\s,;]")
 _INSIDE_WORD = re.compile(rb",(?<=\d,)[-+.\d]")
@@ -21,8 +22,6 @@ _GROUPED = re.compile(rb"(?<![\d.,])[1-9]\d{0,2}(?: \d{3})+(?!\d)")
 _ZERO_GROUP = re.compile(rb"(?<![\d.,])[1-9]\d{0,2} 0\d\d(?!\d)")
 """What can hardly be several: no number begins so."""
 _BETWEEN_DIGITS = re.compile(rb"\d +(?=[-+.\d])")
-_BEGIN = slice(0, 2**16)
-"""Where spaces in numbers show; if they come later, lines have different numbers of words."""
 _LINE = re.compile(rb"[^\r\n]*[^\s][^\r\n]*")
 _EMPTY_CELL = rb"((?<=%b)|(?<![^\r\n]))[ \t]*(?=%b)"
 _MOST_CERTAIN = 4
@@ -50,7 +49,7 @@ def with_spaces(
     """
     if b'"' in text:
         text = _without_quotes(text)
-    if _has_spaced_thousands(text[_BEGIN]):
+    if _has_spaced_thousands(text[HEAD]):
         raise _refused(path, text, "a space in its numbers may separate thousands", first_line)
     if b"," not in text:
         return (_filled(text, b";").translate(_SPACES) if b";" in text else text), False

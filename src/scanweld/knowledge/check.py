@@ -12,7 +12,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
 from scanweld.io import natural_key
 from scanweld.knowledge.facts import Knowledge
-from scanweld.knowledge.turntable import MIN_SCANS, Turntable, turning_pairs
+from scanweld.knowledge.turntable import RULE, Turntable, turning_pairs
 from scanweld.pairs.result import PairKind
 from scanweld.reconstruction import FactReport, FactVerdict
 
@@ -215,7 +215,7 @@ def _apart(pair: tuple[str, str], registered: Registered) -> FactReport:
 def _turntable(registered: Registered) -> FactReport:
     table, good = registered.turntable, turning_pairs(registered.graph.pairs)
     if table is None:
-        few = len({k for edge in good for k in edge}) < MIN_SCANS
+        few = len({k for edge in good for k in edge}) < RULE.min_scans
         return FactReport(
             fact="turntable",
             verdict=FactVerdict.OPEN if few else FactVerdict.CONTRADICTED,

@@ -13,18 +13,31 @@ from scanweld.graph.doubts import DoubtCode, Doubts, doubt_of
 from scanweld.graph.view_graph import Edge, ViewGraph
 from scanweld.pairs.result import PairKind, PairResult
 
-MIN_TURN_DEG = 10.0
-"""A pair that turns by less says little about the axis."""
-MIN_SCANS = 3
-"""Any one motion without a pitch is a turn about some axis: it takes two pairs that agree."""
-MIN_SHARE = 0.5
-"""Of the scans that have good pairs, more than this share must turn about an axis together."""
-FINAL_SHARE = 0.2
-"""Poses in the end lie closer to the axis than pairs alone: to this share of their tolerance,"""
-FINAL_RESIDUALS = 4.0
-"""or to so many times the residual of the good pairs, if that is more."""
-NUM_FITS = 3
-"""Fits, each to the pairs that agree with the one before."""
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class AxisRule:
+    """When an axis is believed, and a scan to turn about it.
+
+    Attributes:
+        min_turn_deg: A pair that turns by less says little about the axis.
+        min_scans: Any one motion without a pitch is a turn about some axis: it takes two pairs
+            that agree.
+        min_share: Of the scans that have good pairs, more must turn about an axis together.
+        num_fits: Fits, each to the pairs that agree with the one before.
+        final_share: Poses in the end lie closer to the axis than pairs alone: to this share of
+            their tolerance,
+        final_residuals: or to so many times the residual of the good pairs, if that is more.
+    """
+
+    min_turn_deg: float = 10.0
+    min_scans: int = 3
+    min_share: float = 0.5
+    num_fits: int = 3
+    final_share: float = 0.2
+    final_residuals: float = 4.0
+
+
+RULE = AxisRule()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -97,7 +110,7 @@ def find_turntable(
         if found is not None and (best is None or _weight(found, good) > _weight(best, good)):
             best = found
     turning = {k for edge in good for k in edge}
-    if best is None or best.num_scans < max(MIN_SCANS, MIN_SHARE * len(turning) + 0.5):
+    if best is None or best.num_scans < max(RULE.min_scans, RULE.min_share * len(turning) + 0.5):
         return None
     return best
 
@@ -106,7 +119,7 @@ def off_axis_doubts(graph: ViewGraph, turntable: Turntable) -> Doubts:
     """Placed scans whose final pose is no turn about the axis from others: thin pairs slide."""
     same = np.array([turntable.same.angle_deg, turntable.same.shift])
     residual = np.array([turntable.angle_deg, turntable.shift])
-    limits = np.maximum(FINAL_SHARE * same, FINAL_RESIDUALS * residual)
+    limits = np.maximum(RULE.final_share * same, RULE.final_residuals * residual)
     told: dict[int, str] = {}
     for component in graph.components:
         poses = component.poses
@@ -125,7 +138,8 @@ def turning_pairs(pairs: Mapping[Edge, PairResult]) -> dict[Edge, PairResult]:
     return {
         edge: pair
         for edge, pair in sorted(pairs.items())
-        if pair.kind is PairKind.GOOD and pair.alternatives[0].i_from_j.angle_deg() > MIN_TURN_DEG
+        if pair.kind is PairKind.GOOD
+        and pair.alternatives[0].i_from_j.angle_deg() > RULE.min_turn_deg
     }
 
 
@@ -155,7 +169,7 @@ def _consensus(
     for seed in good:
         found: Turntable | None = None
         edges: tuple[Edge, ...] = (seed,)
-        for _ in range(NUM_FITS):
+        for _ in range(RULE.num_fits):
             motions = [
                 frames[i] @ good[i, j].alternatives[0].i_from_j @ frames[j].inverse()
                 for i, j in edges

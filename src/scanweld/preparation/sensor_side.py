@@ -21,14 +21,26 @@ from scanweld.geometry.scan import RangeScan
 
 STRONG = 0.3
 """Strength from which a cue decides."""
-MAX_PIXELS = 250
-"""Fall-off is measured on an image of at most so many pixels across."""
-RIM_PIXELS = 4
-"""Width of the rim along the silhouette on which fall-off is measured."""
-STEP_PIXELS = 3
-"""How far inside the rim the depth is that the rim's is compared with."""
-MAX_SLOPE = 4.0
-"""A depth step steeper than this is a jump, not a surface."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _FallOff:
+    """How fall-off is measured.
+
+    Attributes:
+        max_pixels: Across the image that it is measured on, at most.
+        rim_pixels: Width of the rim along the silhouette.
+        step_pixels: How far inside the rim the depth is that the rim's is compared with.
+        max_slope: A depth step steeper than this is a jump, not a surface.
+    """
+
+    max_pixels: int = 250
+    rim_pixels: int = 4
+    step_pixels: int = 3
+    max_slope: float = 4.0
+
+
+_FALL_OFF = _FallOff()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -90,24 +102,25 @@ def fall_off(depth: FloatArray, pixel: float) -> float:
     """
     from scipy import ndimage
 
-    stride = max(1, -(-max(depth.shape) // MAX_PIXELS))
-    margin = 2 * RIM_PIXELS
+    how = _FALL_OFF
+    stride = max(1, -(-max(depth.shape) // how.max_pixels))
+    margin = 2 * how.rim_pixels
     image = np.pad(depth[::stride, ::stride], margin, constant_values=np.nan)
     seen = np.isfinite(image)
-    disk = ndimage.iterate_structure(ndimage.generate_binary_structure(2, 1), RIM_PIXELS)
+    disk = ndimage.iterate_structure(ndimage.generate_binary_structure(2, 1), how.rim_pixels)
     inside = ndimage.binary_fill_holes(ndimage.binary_closing(seen, disk))
     outside = np.asarray(
         ndimage.distance_transform_edt(inside, return_distances=False, return_indices=True)
     )
     rows, columns = np.nonzero(seen)
     inward = np.stack([rows, columns]) - outside[:, rows, columns]
-    is_rim = (inward**2).sum(axis=0) <= RIM_PIXELS**2
+    is_rim = (inward**2).sum(axis=0) <= how.rim_pixels**2
     rows, columns, inward = rows[is_rim], columns[is_rim], inward[:, is_rim]
     inward = inward / np.linalg.norm(inward, axis=0)
-    deeper_rows, deeper_columns = np.rint([rows, columns] + STEP_PIXELS * inward).astype(int)
+    deeper_rows, deeper_columns = np.rint([rows, columns] + how.step_pixels * inward).astype(int)
     rise = image[rows, columns] - image[deeper_rows, deeper_columns]
-    slope = rise / (STEP_PIXELS * stride * pixel)
-    slope = slope[np.isfinite(slope) & (np.abs(slope) <= MAX_SLOPE)]
+    slope = rise / (how.step_pixels * stride * pixel)
+    slope = slope[np.isfinite(slope) & (np.abs(slope) <= how.max_slope)]
     return _balance(np.clip(slope, -1, 1))
 
 

@@ -4,6 +4,8 @@ A plane does not show how the object is turned on it, and after the object has b
 side the plane has moved relative to it. So the plane is removed before scans are registered.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from scanweld.geometry.arrays import BoolArray, FloatArray
@@ -15,18 +17,34 @@ NUM_DRAWS = 300
 """Planes through three points that are tried."""
 FLAT_SPACINGS = 1.5
 """Distance from a plane, in point spacings, up to which a point lies in it."""
-MIN_SHARE = 0.15
-"""Least share of the points that lie in the plane or below it."""
-MIN_ABOVE, MAX_BELOW = 0.03, 0.3
-"""Least share of all points that lie above the plane; most below it, as a share of those above."""
-MIN_HEIGHT = 0.15
-"""Least height of what stands on the plane, in its own diameters: a lower one is a relief, of one
-piece with the plane."""
-NUM_SECTORS, MIN_SECTORS = 12, 8
-"""Sectors around the object, and the number of them in which the plane must be seen."""
-REACH = 0.6
-"""Distance from the object's middle to which the plane must reach in a sector to count as seen
-there, as a share of the object's own reach."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SupportRule:
+    """What a plane must show to be what the object stands on.
+
+    Attributes:
+        min_share: Least share of the points that lie in the plane or below it.
+        min_above: Least share of all points that lie above the plane.
+        max_below: Most that lie below it, as a share of those above.
+        min_height: Least height of what stands on it, in its own diameters: a lower one is a
+            relief, of one piece with the plane.
+        num_sectors: Sectors around the object.
+        min_sectors: Those in which the plane must be seen.
+        reach: Distance from the object's middle to which the plane must reach in a sector to count
+            as seen there, as a share of the object's own reach.
+    """
+
+    min_share: float = 0.15
+    min_above: float = 0.03
+    max_below: float = 0.3
+    min_height: float = 0.15
+    num_sectors: int = 12
+    min_sectors: int = 8
+    reach: float = 0.6
+
+
+RULE = SupportRule()
 
 
 def find_support(points: FloatArray, spacing: float) -> BoolArray | None:
@@ -48,13 +66,14 @@ def find_support(points: FloatArray, spacing: float) -> BoolArray | None:
     deviation = float(np.sqrt(np.mean(height[within] ** 2)))
     reach = max(FLAT_SPACINGS * spacing, SIGNIFICANT_SIGMAS * deviation)
     is_above = height > reach
+    above = points[is_above]
     num_below = int((height < -reach).sum())
     if (
-        is_above.mean() < MIN_ABOVE
-        or num_below > MAX_BELOW * is_above.sum()
-        or (~is_above).mean() < MIN_SHARE
-        or np.quantile(height[is_above], 0.95) < MIN_HEIGHT * principal_diameter(points[is_above])
-        or not _surrounds(points[~is_above], points[is_above], normal)
+        is_above.mean() < RULE.min_above
+        or num_below > RULE.max_below * is_above.sum()
+        or (~is_above).mean() < RULE.min_share
+        or np.quantile(height[is_above], 0.95) < RULE.min_height * principal_diameter(above)
+        or not _surrounds(points[~is_above], above, normal)
     ):
         return None
     return ~is_above
@@ -74,7 +93,7 @@ def _main_plane(points: FloatArray, reach: float) -> tuple[FloatArray, float] | 
     offsets = (normals * a[real]).sum(axis=1)
     counts = (np.abs(tried @ normals.T - offsets) <= reach).sum(axis=0)
     best = int(np.argmax(counts))
-    if counts[best] < MIN_SHARE * len(tried):
+    if counts[best] < RULE.min_share * len(tried):
         return None
     normal, offset = normals[best], float(offsets[best])
     for _ in range(3):
@@ -92,10 +111,9 @@ def _surrounds(plane: FloatArray, above: FloatArray, normal: FloatArray) -> bool
     sides = []
     for points in (plane, above):
         flat = points @ across - middle
-        sector = ((np.arctan2(flat[:, 1], flat[:, 0]) / (2 * np.pi) + 0.5) * NUM_SECTORS).astype(
-            np.int64
-        )
-        reach = np.zeros(NUM_SECTORS)
-        np.maximum.at(reach, np.minimum(sector, NUM_SECTORS - 1), np.linalg.norm(flat, axis=1))
+        turn = np.arctan2(flat[:, 1], flat[:, 0]) / (2 * np.pi) + 0.5
+        sector = (turn * RULE.num_sectors).astype(np.int64)
+        reach = np.zeros(RULE.num_sectors)
+        np.maximum.at(reach, np.minimum(sector, RULE.num_sectors - 1), np.linalg.norm(flat, axis=1))
         sides.append(reach)
-    return int((sides[0] >= REACH * sides[1]).sum()) >= MIN_SECTORS
+    return int((sides[0] >= RULE.reach * sides[1]).sum()) >= RULE.min_sectors

@@ -5,6 +5,8 @@ cell of a raster square to that line. Of all such lines the one is taken from wh
 least steep on average, by a mean over all that are nearly as good as the best.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
@@ -13,29 +15,50 @@ from scanweld.geometry.sampling import NUM_SAMPLED
 from scanweld.geometry.scan import RangeScan
 from scanweld.preparation.resolution import point_spacing
 
-FIRST_POINTS = 6_000
-"""Points of a scan that the first steps of the search use, at most; the last uses more."""
-NUM_COARSE = 300
-"""Directions on the half sphere that are tried first, about 8 deg apart."""
-NUM_FINE = 2_000
-"""Directions on the half sphere of which those near the best ones are tried, about 3 deg apart."""
-NUM_STARTS = 6
-"""Distinct coarse directions around which fine ones are tried."""
-START_DEG = 10.0
-"""Angle within which fine directions are tried around each of these,"""
-CAP_DEG = 25.0
-"""and within which they are averaged around the best of all."""
-CELL_SPACINGS = 1.5
-"""Cell of the raster, in spacings of the points."""
-LAYERED_CELLS = 1.5
-"""Standard deviation of depth within a cell, in cells, above which it holds several layers."""
-MAX_DEVIATION = 4.0
-"""Most that a cell's deviation of depth counts, in cells."""
-STEEPNESS_WEIGHT = 0.1
-"""Weight of the mean deviation of depth, a measure of steepness, beside the share of layered
-cells."""
-NEARLY = 0.005
-"""Excess of the cost over the least at which a direction's weight has fallen to 1/e."""
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Cost:
+    """How unlike a height field points are along a direction.
+
+    Attributes:
+        cell_spacings: Cell of the raster, in spacings of the points.
+        layered_cells: Standard deviation of depth within a cell, in cells, above which it holds
+            several layers.
+        max_deviation: Most that a cell's deviation of depth counts, in cells.
+        steepness_weight: Of the mean deviation of depth, a measure of steepness, beside the share
+            of layered cells.
+        nearly: Excess of the cost over the least at which a direction's weight has fallen to 1/e.
+    """
+
+    cell_spacings: float = 1.5
+    layered_cells: float = 1.5
+    max_deviation: float = 4.0
+    steepness_weight: float = 0.1
+    nearly: float = 0.005
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Search:
+    """How the line of sight is searched for, coarse to fine.
+
+    Attributes:
+        first_points: Of a scan, in the first steps, at most; the last uses more.
+        num_coarse: Directions on the half sphere that are tried first, about 8 deg apart.
+        num_fine: Directions of which those near the best ones are tried, about 3 deg apart.
+        num_starts: Distinct coarse directions around which fine ones are tried.
+        start_deg: Angle within which they are, around each.
+        cap_deg: Angle within which they are averaged around the best of all.
+    """
+
+    first_points: int = 6_000
+    num_coarse: int = 300
+    num_fine: int = 2_000
+    num_starts: int = 6
+    start_deg: float = 10.0
+    cap_deg: float = 25.0
+
+
+_COST, _SEARCH = _Cost(), _Search()
 
 
 def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -48,19 +71,18 @@ def line_of_sight_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray,
     """
     frame = _principal_frame(points)
     centred = (points - points.mean(axis=0)) @ frame.T
-    first = _thinned(centred, FIRST_POINTS)
-    cell = CELL_SPACINGS * point_spacing(first)
-    coarse, fine = _half_sphere(NUM_COARSE), _half_sphere(NUM_FINE)
-    candidates = np.concatenate(
-        [_cap(fine, start, START_DEG) for start in _starts(coarse, _costs(first, coarse, cell))]
-    )
+    first = _thinned(centred, _SEARCH.first_points)
+    cell = _COST.cell_spacings * point_spacing(first)
+    coarse, fine = _half_sphere(_SEARCH.num_coarse), _half_sphere(_SEARCH.num_fine)
+    starts = _starts(coarse, _costs(first, coarse, cell))
+    candidates = np.concatenate([_cap(fine, start, _SEARCH.start_deg) for start in starts])
     best = candidates[int(np.argmin(_costs(first, candidates, cell)))]
 
     dense = _thinned(centred, NUM_SAMPLED)
-    cell = CELL_SPACINGS * point_spacing(dense)
-    cap = _cap(fine, best, CAP_DEG)
+    cell = _COST.cell_spacings * point_spacing(dense)
+    cap = _cap(fine, best, _SEARCH.cap_deg)
     costs = _costs(dense, cap, cell)
-    axis = np.exp((costs.min() - costs) / NEARLY) @ cap
+    axis = np.exp((costs.min() - costs) / _COST.nearly) @ cap
     axis /= np.linalg.norm(axis)
     layered, _ = _depth_within_cells(dense, axis, cell)
     right = _square_to(axis)
@@ -127,9 +149,9 @@ def _starts(axes: FloatArray, costs: FloatArray) -> list[FloatArray]:
     """The best few axes that are farther from each other than the caps around them reach."""
     starts: list[FloatArray] = []
     for axis in axes[np.argsort(costs, kind="stable")]:
-        if all(abs(axis @ other) < np.cos(np.radians(1.5 * START_DEG)) for other in starts):
+        if all(abs(axis @ other) < np.cos(np.radians(1.5 * _SEARCH.start_deg)) for other in starts):
             starts.append(axis)
-        if len(starts) == NUM_STARTS:
+        if len(starts) == _SEARCH.num_starts:
             break
     return starts
 
@@ -137,7 +159,7 @@ def _starts(axes: FloatArray, costs: FloatArray) -> list[FloatArray]:
 def _costs(points: FloatArray, axes: FloatArray, cell: float) -> FloatArray:
     """How unlike a gentle height field the points are along each axis."""
     found = np.array([_depth_within_cells(points, axis, cell) for axis in axes])
-    return found @ (1.0, STEEPNESS_WEIGHT)
+    return found @ (1.0, _COST.steepness_weight)
 
 
 def _depth_within_cells(points: FloatArray, axis: FloatArray, cell: float) -> tuple[float, float]:
@@ -149,8 +171,8 @@ def _depth_within_cells(points: FloatArray, axis: FloatArray, cell: float) -> tu
     mean = np.bincount(cells, weights=depth) / filled
     variance = np.bincount(cells, weights=depth * depth) / filled - mean * mean
     deviation = np.sqrt(np.maximum(variance, 0)) / cell
-    layered = float(count[deviation > LAYERED_CELLS].sum()) / len(points)
-    return layered, float(count @ np.minimum(deviation, MAX_DEVIATION)) / len(points)
+    layered = float(count[deviation > _COST.layered_cells].sum()) / len(points)
+    return layered, float(count @ np.minimum(deviation, _COST.max_deviation)) / len(points)
 
 
 def _raster(

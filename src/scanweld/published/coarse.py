@@ -22,14 +22,26 @@ from scanweld.published.signature_matching import match_signatures
 
 MIN_BREADTH_DIAMETERS = 0.02
 """Matched keypoints that lie on a line to within this, root mean square, hold no pose either."""
-NUM_TURNS = 36
-"""Turns about the normal for each pair of keypoints, where the evidence chooses."""
-NUM_STARTS = 30
-"""Distinct start poses, of those looked at, that go on to a short ICP,"""
-NUM_SHORT_ROUNDS = 30
-"""of so many rounds"""
-NUM_SHORT_SAMPLES = 300
-"""and samples; the best of them goes on to the ICP of all."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _EvidenceSearch:
+    """How start poses are searched where the evidence chooses.
+
+    Attributes:
+        num_turns: About the normal, for each pair of keypoints.
+        num_starts: Distinct poses, of those looked at, that go on to a short ICP.
+        num_rounds: Of that,
+        num_samples: and samples in it; the best pose goes on to the ICP of all.
+    """
+
+    num_turns: int = 36
+    num_starts: int = 30
+    num_rounds: int = 30
+    num_samples: int = 300
+
+
+_SEARCH = _EvidenceSearch()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -123,15 +135,15 @@ def _register_by_evidence(
     anchors_i = Anchors(points=features_i.points, normals=features_i.normals)
     anchors_j = Anchors(points=features_j.points, normals=features_j.normals)
     coarse, middle, _ = (share * i.diameter for share in PairsConfig().tolerance_diameters)
-    rows, _ = sweep(field_i, field_j, anchors_i, anchors_j, NUM_TURNS, coarse, MAX_POSES)
+    rows, _ = sweep(field_i, field_j, anchors_i, anchors_j, _SEARCH.num_turns, coarse, MAX_POSES)
     same = same_hypothesis(i.diameter)
-    chosen = distinct_poses(rows, field_j.centre, same.angle, same.shift, NUM_STARTS)
+    chosen = distinct_poses(rows, field_j.centre, same.angle, same.shift, _SEARCH.num_starts)
     if len(chosen) == 0:
         return _no_pose(0, "no pair of keypoints gives a pose that the sensors allow")
-    source, target = j.samples.points[:NUM_SHORT_SAMPLES], field_i.surface[:, :3]
+    source, target = j.samples.points[: _SEARCH.num_samples], field_i.surface[:, :3]
     poses = [
         point_icp(
-            source, target, to_pose(row), config.trim, max_rounds=NUM_SHORT_ROUNDS
+            source, target, to_pose(row), config.trim, max_rounds=_SEARCH.num_rounds
         ).target_from_source
         for row in rows[chosen]
     ]

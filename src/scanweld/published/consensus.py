@@ -5,6 +5,8 @@ matches; among the few nearest the right one often is. Two matches that fit each
 and the other matches say which of these poses to take.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from scanweld.geometry.arrays import FloatArray, IntArray
@@ -13,16 +15,28 @@ from scanweld.heat.features import Features
 from scanweld.pairs.problem import to_pose
 from scanweld.published.signature_matching import signature_distances
 
-LENGTH_TOLERANCE_DIAMETERS = 0.03
-"""Two matches fit each other if the distances between their keypoints differ by less,"""
-MIN_LENGTH_DIAMETERS = 0.1
-"""are not less than this,"""
-COSINE_TOLERANCE = 0.35
-"""and the cosines between normals and their connection differ by less."""
 MAX_POSES = 2000
 """Start poses that are looked at: the best, by whatever they are first ranked by."""
-SUPPORT_DIAMETERS = 0.05
-"""A match supports a pose that brings its keypoints to within this."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Fit:
+    """When matches fit each other, and a pose; lengths in diameters.
+
+    Attributes:
+        length: The distances between the keypoints of two matches differ by less,
+        min_length: and are not less than this,
+        cosine: and the cosines between normals and their connection differ by less.
+        support: A match supports a pose that brings its keypoints to within this.
+    """
+
+    length: float = 0.03
+    min_length: float = 0.1
+    cosine: float = 0.35
+    support: float = 0.05
+
+
+_FIT = _Fit()
 
 
 def agreed_pose(
@@ -40,7 +54,7 @@ def agreed_pose(
     rows = consistent_poses(features_i, features_j, matches, diameter)
     if len(rows) == 0:
         return None, 0
-    support = _num_supporting(rows, features_i, features_j, matches, SUPPORT_DIAMETERS * diameter)
+    support = _num_supporting(rows, features_i, features_j, matches, _FIT.support * diameter)
     best = int(np.argmax(support))
     return to_pose(rows[best]), int(support[best])
 
@@ -65,9 +79,9 @@ def consistent_poses(
     )
     stretch = np.abs(of_i[:, 0] - of_j[:, 0]) / diameter
     twist = np.abs(of_i[:, 1:] - of_j[:, 1:]).max(axis=1, initial=0.0)
-    fits = (stretch < LENGTH_TOLERANCE_DIAMETERS) & (twist < COSINE_TOLERANCE)
-    fits &= np.minimum(of_i[:, 0], of_j[:, 0]) > MIN_LENGTH_DIAMETERS * diameter
-    misfit = stretch / LENGTH_TOLERANCE_DIAMETERS + twist / COSINE_TOLERANCE
+    fits = (stretch < _FIT.length) & (twist < _FIT.cosine)
+    fits &= np.minimum(of_i[:, 0], of_j[:, 0]) > _FIT.min_length * diameter
+    misfit = stretch / _FIT.length + twist / _FIT.cosine
     kept = np.flatnonzero(fits)
     kept = kept[np.argsort(misfit[kept], kind="stable")][:MAX_POSES]
     return _poses(features_i, features_j, matches[one[kept]], matches[two[kept]])

@@ -9,16 +9,30 @@ from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.gauss_newton import damped, jacobian, motion_of
 from scanweld.geometry.pose import Pose
 
-FIRST_DAMPING = 1e-4
-"""Of the first step, relative to the mean of the normal matrix's diagonal."""
-DAMPING_FACTOR = 10.0
-"""By how much the damping falls after a step that was accepted and grows after one that was not."""
-LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e6
-"""Least damping; and that at which no step helps any more."""
 MAX_STEPS = 30
 """Steps that are accepted, at most."""
 SMALL_DECREASE = 1e-6
 """Share of the cost: the search ends when a step gains less."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Damping:
+    """Levenberg's damping, relative to the mean of the normal matrix's diagonal.
+
+    Attributes:
+        first: Of the first step.
+        factor: By which it falls after a step that was accepted and grows after one that was not.
+        least: It falls no further.
+        most: Beyond, no step helps any more.
+    """
+
+    first: float = 1e-4
+    factor: float = 10.0
+    least: float = 1e-9
+    most: float = 1e6
+
+
+RULE = Damping()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -66,22 +80,22 @@ def levenberg_marquardt(
         The poses, and the cost at the start and after each accepted step.
     """
     current, pulls = dict(poses), pulls_at(poses)
-    costs, damping = [cost_of(pulls)], FIRST_DAMPING
+    costs, damping = [cost_of(pulls)], RULE.first
     while len(costs) <= MAX_STEPS:
         centre = np.concatenate([each.points for each in pulls]).mean(axis=0)
         free, normal, gradient = _normal_equations(pulls, current, held, centre, arm)
         scale = float(np.trace(normal)) / max(len(normal), 1)
-        while damping <= MOST_DAMPING and scale > 0:
+        while damping <= RULE.most and scale > 0:
             twist = -np.linalg.solve(normal + damping * scale * np.eye(len(normal)), gradient)
             trial = _moved(current, free, twist.astype(np.float64), centre, arm)
             trial_pulls = pulls_at(trial)
             cost = cost_of(trial_pulls)
             if cost < costs[-1]:
                 break
-            damping *= DAMPING_FACTOR
+            damping *= RULE.factor
         else:
             break
-        current, pulls, damping = trial, trial_pulls, max(damping / DAMPING_FACTOR, LEAST_DAMPING)
+        current, pulls, damping = trial, trial_pulls, max(damping / RULE.factor, RULE.least)
         costs.append(cost)
         if costs[-2] - cost <= SMALL_DECREASE * costs[-2]:
             break

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scanweld.app.html_report.style import STYLE
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 
 RESIDUAL_STOPS = ("#3b4cc0", "#6f9bd8", "#c9d7d9", "#f2c46d", "#e2703a", "#a50f26")
@@ -15,17 +16,14 @@ BORDER = "#ff2d2d"
 """Open borders."""
 UNKNOWN = "#9a9a95"
 """Where nothing was measured."""
-GOLDEN = 0.6180339887498949
-LEVELS = (0.52, 0.64, 0.44)
-"""Lightness in turn, so that scans of like hue differ."""
 
 
 def scan_colors(count: int) -> list[str]:
     """A colour for each scan, ``#rrggbb``; few scans get hues far apart, many differ in light."""
-    step = 1 / count if 0 < count <= 12 else GOLDEN
+    step = 1 / count if 0 < count <= 12 else STYLE.hue_step
     colors = []
     for k in range(count):
-        level = LEVELS[k % (1 if count <= 5 else 3)]
+        level = STYLE.scan_levels[k % (1 if count <= 5 else 3)]
         rgb = colorsys.hls_to_rgb((0.57 + k * step) % 1.0, level, 0.62)
         colors.append("#" + "".join(f"{round(255 * part):02x}" for part in rgb))
     return colors

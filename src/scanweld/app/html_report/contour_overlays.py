@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanweld.app.html_report.style import STYLE
 from scanweld.app.model_files import PairEntry
 from scanweld.config import ContoursConfig
 from scanweld.contours.coherence import coherence, contour_pair
@@ -12,9 +13,6 @@ from scanweld.contours.contour_sets import ContourPoints, observe_contours
 from scanweld.geometry.arrays import BoolArray
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.prepared import PreparedScan
-
-NUM_PAIRS = 4
-"""Pairs that are shown."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -65,7 +63,7 @@ def contour_overlays(
     accepted = [pair for pair in pairs if pair.accepted]
     accepted.sort(key=lambda pair: (pair.score or 0.0, pair.i, pair.j))
     overlays = []
-    for pair in accepted[:NUM_PAIRS]:
+    for pair in accepted[: STYLE.contour_pairs]:
         scans = [prepared(name) for name in (pair.i, pair.j)]
         sensors = [
             world_from_scan(name) @ scan.scan_from_sensor

@@ -5,21 +5,13 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from scanweld.app.html_report.stills import Still, still_of
+from scanweld.app.html_report.style import STYLE
 from scanweld.cut import mask_of
 from scanweld.cut.frames import depth_image
 from scanweld.geometry.arrays import BoolArray, ByteArray
 from scanweld.geometry.scan import RangeScan
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanReport
-
-WIDTH = 240
-"""Pixels across a picture, at most."""
-GREYS = (235.0, 60.0)
-"""Of what is near and of what is far."""
-KEPT = (0.35, 0.8, 0.55)
-"""How the grey of pixels that were kept is tinted."""
-NOTHING = (24, 28, 40)
-"""Colour of pixels that saw nothing."""
 
 
 def cut_pictures(
@@ -58,9 +50,9 @@ def _is_colored(scan: RangeScan) -> bool:
 
 def _colors(scan: RangeScan) -> ByteArray:
     assert scan.grid is not None and scan.colors is not None
-    step = -(-scan.grid.shape[1] // WIDTH)
-    grid = scan.grid[::step, ::step]
-    return np.where((grid >= 0)[..., None], scan.colors[grid], np.array(NOTHING, dtype=np.uint8))
+    step = -(-scan.grid.shape[1] // STYLE.frame_pixels)
+    grid, nothing = scan.grid[::step, ::step], np.array(STYLE.nothing, dtype=np.uint8)
+    return np.where((grid >= 0)[..., None], scan.colors[grid], nothing)
 
 
 def depth_picture(scan: RangeScan, kept: BoolArray | None, alt: str) -> Still:
@@ -72,12 +64,13 @@ def picture_of(scan: RangeScan, kept: BoolArray | None = None) -> ByteArray:
     """The same as pixels (h, w, 3)."""
     depth = depth_image(scan)
     kept = np.zeros(depth.shape, dtype=bool) if kept is None else kept
-    step = -(-depth.shape[1] // WIDTH)
+    step = -(-depth.shape[1] // STYLE.frame_pixels)
     depth, kept = depth[::step, ::step], kept[::step, ::step]
     has = np.isfinite(depth)
     near, far = np.quantile(depth[has], [0.02, 0.98]) if has.any() else (0.0, 1.0)
     with np.errstate(invalid="ignore"):
         share = np.clip((depth - near) / max(far - near, np.finfo(float).tiny), 0.0, 1.0)
-    grey = np.where(has, GREYS[0] + (GREYS[1] - GREYS[0]) * share, 0.0)[..., None]
-    color = np.where(kept[..., None], grey * KEPT, grey)
-    return np.rint(np.where(has[..., None], color, NOTHING)).astype(np.uint8)
+    bright, dark = STYLE.frame_greys
+    grey = np.where(has, bright + (dark - bright) * share, 0.0)[..., None]
+    color = np.where(kept[..., None], grey * STYLE.kept_tint, grey)
+    return np.rint(np.where(has[..., None], color, STYLE.nothing)).astype(np.uint8)

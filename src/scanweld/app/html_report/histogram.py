@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanweld.app.html_report.style import STYLE
 from scanweld.geometry.arrays import FloatArray
-
-NUM_BINS = 40
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -36,7 +35,8 @@ def histogram(distances: FloatArray) -> Histogram | None:
         return None
     median, p90, p99 = (float(value) for value in np.quantile(distances, [0.5, 0.9, 0.99]))
     largest = p99 or 1.0
-    counts, _ = np.histogram(np.minimum(distances, largest), NUM_BINS, range=(0.0, largest))
+    within, bars = np.minimum(distances, largest), STYLE.histogram_bars
+    counts, _ = np.histogram(within, bars, range=(0.0, largest))
     return Histogram(
         shares=tuple((counts / len(distances)).tolist()),
         largest=largest,

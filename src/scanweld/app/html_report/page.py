@@ -23,6 +23,7 @@ from scanweld.app.html_report.orientation import as_seen_from
 from scanweld.app.html_report.scene import Scene, make_scene, payload
 from scanweld.app.html_report.sources import Sources
 from scanweld.app.html_report.stills import AROUND, FACES, sides_of, stills
+from scanweld.app.html_report.style import STYLE
 from scanweld.app.html_report.surface_check import (
     SurfaceCheck,
     check_surface,
@@ -40,9 +41,6 @@ from scanweld.geometry.shading import Side
 from scanweld.io import natural_key
 from scanweld.reconstruction import ScanVerdict
 from scanweld.sensor.model import SPREAD_SIGMAS
-
-LONGEST_LABEL = 9
-"""Where names are longer, without what they all begin with, the scans are called by numbers."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -128,7 +126,7 @@ def scan_looks(names: Sequence[str]) -> dict[str, ScanLook]:
     colors = scan_colors(len(ordered))
     prefix = _shared_beginning(ordered).rstrip("0123456789")  # 01 to 09 are not 1 to 9
     labels = [name.removeprefix(prefix) or name for name in ordered]
-    is_numbered = max(map(len, labels), default=0) > LONGEST_LABEL
+    is_numbered = max(map(len, labels), default=0) > STYLE.longest_label
     if is_numbered:
         labels = [str(k + 1) for k in range(len(ordered))]
     return {

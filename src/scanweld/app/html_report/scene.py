@@ -19,6 +19,7 @@ from scanweld.app.html_report.colors import (
 )
 from scanweld.app.html_report.orientation import Orientation
 from scanweld.app.html_report.simplify import cluster_faces, cluster_means, cluster_vertices
+from scanweld.app.html_report.style import STYLE
 from scanweld.app.html_report.surface_check import (
     OpenBorders,
     SurfaceCheck,
@@ -28,10 +29,6 @@ from scanweld.app.html_report.surface_check import (
 from scanweld.geometry.arrays import ByteArray, FloatArray, IntArray
 from scanweld.geometry.mesh import TriangleMesh, vertex_normals
 
-MAX_SHOWN = 160_000
-"""Vertices of the model on the page, and points of all scans together, at most."""
-RESIDUAL_QUANTILE = 0.98
-"""Of the residuals at vertices; the colours end there."""
 NO_VALUE = np.iinfo(np.uint8).max
 """Byte that says that a vertex has no residual."""
 
@@ -79,7 +76,7 @@ class Scene:
 
 def make_scene(mesh: TriangleMesh, borders: OpenBorders, check: SurfaceCheck | None) -> Scene:
     """Thin the model and the scans to what a page can hold."""
-    cluster = cluster_vertices(mesh.vertices, MAX_SHOWN)
+    cluster = cluster_vertices(mesh.vertices, STYLE.max_shown)
     vertices = cluster_means(cluster, mesh.vertices)
     faces = cluster_faces(cluster, mesh.faces)
     colors = None
@@ -94,7 +91,7 @@ def make_scene(mesh: TriangleMesh, borders: OpenBorders, check: SurfaceCheck | N
         return Scene(mesh=shown, borders=edges)
     residual = cluster_means(cluster, check.residual[:, None])[:, 0]
     known = residual[np.isfinite(residual)]
-    end = float(np.quantile(known, RESIDUAL_QUANTILE)) if len(known) else 0.0
+    end = float(np.quantile(known, STYLE.residual_quantile)) if len(known) else 0.0
     support = np.rint(cluster_means(cluster, check.support[:, None].astype(float))[:, 0])
     points, normals, number = _thinned(check)
     return Scene(
@@ -115,7 +112,7 @@ def _thinned(check: SurfaceCheck) -> tuple[FloatArray, FloatArray, IntArray]:
     rng = np.random.default_rng(0)  # evenly strided points of a grid would show its columns
     points, directions_, numbers = [], [], []
     for k, (name, all_points) in enumerate(check.points.items()):
-        wanted = len(all_points) * min(total, MAX_SHOWN) // max(total, 1)
+        wanted = len(all_points) * min(total, STYLE.max_shown) // max(total, 1)
         chosen = np.sort(rng.permutation(len(all_points))[:wanted])
         points.append(all_points[chosen])
         directions_.append(check.normals[check.nearest[name][chosen]])

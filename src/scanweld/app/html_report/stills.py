@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from scanweld.app.html_report.orientation import Orientation
+from scanweld.app.html_report.style import STYLE
 from scanweld.geometry.arrays import ByteArray
 from scanweld.geometry.mesh import TriangleMesh
 from scanweld.geometry.shading import Side, png_bytes, seen_from
 from scanweld.work.threads import map_in_order
 
-PIXELS = 440
-"""Longer side of a picture."""
 AROUND = ("the front", "the right", "the left")
 FACES = ("the front", "behind", "below")
 """Sides from which the model is shown, the first three a third of a turn apart."""
@@ -37,7 +36,8 @@ def sides_of(mesh: TriangleMesh, orientation: Orientation, workers: int = 1) -> 
         "behind": (-front, up),
         "below": (-up, front),
     }
-    sides = map_in_order(lambda view: seen_from(mesh, *view, PIXELS), [*views.values()], workers)
+    size = STYLE.still_pixels
+    sides = map_in_order(lambda view: seen_from(mesh, *view, size), [*views.values()], workers)
     return dict(zip(views, sides, strict=True))
 
 

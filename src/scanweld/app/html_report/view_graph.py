@@ -5,13 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanweld.app.html_report.style import STYLE
 from scanweld.app.model_files import PairEntry
 from scanweld.pairs.result import PairKind
-
-LEVELS = 5
-"""Steps of strength that are drawn differently."""
-FULL_SCORE = 0.6
-"""Score from which a pair without a confidence is drawn strongest."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -68,8 +64,9 @@ def draw_graph(
 
 def pair_level(pair: PairEntry) -> int:
     """The step, 0 to 4, at which a pair is drawn: by its confidence, or else by its score."""
-    strength = (pair.score or 0.0) / FULL_SCORE if pair.confidence is None else pair.confidence
-    return int(np.clip(np.floor(strength * LEVELS), 0, LEVELS - 1))
+    of_score = (pair.score or 0.0) / STYLE.graph_full_score
+    strength = of_score if pair.confidence is None else pair.confidence
+    return int(np.clip(np.floor(strength * STYLE.graph_levels), 0, STYLE.graph_levels - 1))
 
 
 def round_order(names: Sequence[str], accepted: Sequence[PairEntry]) -> list[str]:
