@@ -34,8 +34,8 @@ KERNELS = {
     "geometry.mesh.corners_at": "i8w2 i8",
     "geometry.mesh._opposite_edges": "i8w2 i8w1 i8w1",
     "preparation.sampling._farthest": "f8w2 i8 i8 f8",
-    "pairs.hypotheses._score_all": "f4w3 f4w1 f4w3 f4w3 f4w4 f4w2 f4w3 f4w1 f4w3 f4w3 f4w4 f4w2 "
-    "f4w1 f8w2 f4 f4w3",
+    "pairs.hypothesis_scores.score_all": "f4w3 f4w1 f4w3 f4w3 f4w4 f4w2 f4w3 f4w1 f4w3 f4w3 "
+    "f4w4 f4w2 f4w1 f8w2 f4 f4w3",
     "pairs.distinct.distinct_poses": "f8w2 f8w1 f8 f8 i8",
     "evidence.icp._refine_all": "f8w2 f8w2 f8w2 i4w3 f8w1 f8w2 f8w2 f8w2 i4w3 f8w1 f8w2 f8w1 i8 "
     "f8w1 f8",

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scanweld.compiled.kernels import njit
 from scanweld.evidence.evidence import CONTRADICT_WEIGHT, GRAZING_WEIGHT, VIOLATION_WEIGHT
 from scanweld.evidence.field import (
     RASTER_DEPTH,
@@ -19,18 +18,10 @@ from scanweld.evidence.field import (
     RASTER_OUTSIDE,
     ScanField,
 )
-from scanweld.evidence.visibility import (
-    AGREE,
-    AGREE_COSINE,
-    CONTRADICT,
-    CONTRADICT_COSINE,
-    FREE,
-    FRONT,
-    GRAZING,
-    UNKNOWN,
-)
+from scanweld.evidence.visibility import AGREE, CONTRADICT, FREE, FRONT, GRAZING, UNKNOWN
 from scanweld.geometry.arrays import FloatArray, frozen
 from scanweld.geometry.prepared import PixelKind
+from scanweld.pairs.hypothesis_scores import score_all
 
 Single = NDArray[np.float32]
 
@@ -42,9 +33,6 @@ LOOK_FLOORS = (-0.6, -0.4, -0.33, -0.25)
 overlap by 5 %, the good hypotheses near the truth score at least -0.47, -0.25, -0.27, -0.12."""
 CELL_DIAMETERS = 0.01
 """Edge of a pixel of the coarse range image: a quarter of the tolerance by which it is asked."""
-MIN_SWEPT_AGREE = 0.05
-"""Share of samples that must agree: else poses that touch nothing, and so violate nothing, crowd
-out those near the right one, where a thin object violates more than it agrees."""
 SEARCH_FREE_WEIGHT = 1.0
 """The silhouette guides the search more than it speaks against an answer: real ones have gaps."""
 SWEEP_VIOLATION_WEIGHT = 2.5
@@ -120,10 +108,10 @@ def sweep(
         return np.zeros((0, 12)), np.zeros(0)
     hung_i, hung_j = _hung(anchors_i, num_turns, 1.0), _hung(anchors_j, num_turns, -1.0)
     scores = np.full((len(anchors_i.points), len(anchors_j.points), num_turns), -np.inf, np.float32)
-    _score_all(
+    score_all(
         *_coarse_image(i), *_seen_from(anchors_i, i), hung_i, anchors_i.points.astype(np.float32),
         *_coarse_image(j), *_seen_from(anchors_j, j), hung_j, anchors_j.points.astype(np.float32),
-        SWEEP_WEIGHTS, np.column_stack([LOOK_AFTER, LOOK_FLOORS]), np.float32(tolerance), scores,
+        SWEEP_WEIGHTS, _looks(i, j), np.float32(tolerance), scores,
     )  # fmt: skip
     left = np.flatnonzero(scores.ravel() > -np.inf)
     left = left[np.argsort(-scores.ravel()[left], kind="stable")[:max_count]]
@@ -148,12 +136,21 @@ def _hung(anchors: Anchors, num_turns: int, sense: float) -> Single:
     return _turned(anchors, num_turns, sense).astype(np.float32)
 
 
+def _looks(i: ScanField, j: ScanField) -> FloatArray:
+    """(L, 2) samples of each scan and the least sum of weights after so many; last all of them."""
+    num = min(NUM_LOOKS, len(i.points), len(j.points))
+    floors = [(n, 2 * n * f) for n, f in zip(LOOK_AFTER, LOOK_FLOORS, strict=True) if n < num]
+    return np.array([*floors, (num, -np.inf)])
+
+
 def _seen_from(anchors: Anchors, scan: ScanField) -> tuple[Single, Single]:
-    """(K, S, 3) the scan's first samples, and their normals, in the frame of each anchor."""
+    """(K, 3, S) the scan's first samples, and their normals, in the frame of each anchor."""
     rotations = anchors.rotations()
     apart = scan.points[None, :NUM_LOOKS] - anchors.points[:, None]
     normals = np.broadcast_to(scan.normals[None, :NUM_LOOKS], apart.shape)
-    return (apart @ rotations).astype(np.float32), (normals @ rotations).astype(np.float32)
+    both = ((vectors @ rotations).astype(np.float32).mT for vectors in (apart, normals))
+    points, turned = map(np.ascontiguousarray, both)
+    return points, turned
 
 
 def _coarse_image(scan: ScanField) -> tuple[Single, Single]:
@@ -176,102 +173,3 @@ def _coarse_image(scan: ScanField) -> tuple[Single, Single]:
     cells[off, 1] = np.where(is_free, raster[..., RASTER_OUTSIDE], -np.inf)[off]
     model, focal, centre = scan.camera[:1], scan.camera[1:3] / stride, scan.camera[3:5] - first
     return cells, np.concatenate([model, focal, centre / stride]).astype(np.float32)
-
-
-@njit(cache=True, nogil=True)
-def _say(
-    cells: Single,
-    camera: Single,
-    turns: Single,
-    places: Single,
-    points: Single,
-    normals: Single,
-    at: tuple[int, int, int, int],
-    tolerance: np.float32,
-) -> int:
-    """What a sensor says of an oriented point turned and shifted into its frame.
-
-    Indices ``at`` are those of the anchor there, the turn, the anchor here and the sample: views of
-    arrays would cost more than all the rest.
-
-    Returns:
-        0 agree, 1 front, 2 contradict, 3 free, 4 nothing.
-    """
-    a, t, b, s = at
-    px, py, pz = points[b, s, 0], points[b, s, 1], points[b, s, 2]
-    x = turns[a, t, 0, 0] * px + turns[a, t, 0, 1] * py + turns[a, t, 0, 2] * pz + places[a, 0]
-    y = turns[a, t, 1, 0] * px + turns[a, t, 1, 1] * py + turns[a, t, 1, 2] * pz + places[a, 1]
-    z = turns[a, t, 2, 0] * px + turns[a, t, 2, 1] * py + turns[a, t, 2, 2] * pz + places[a, 2]
-    u, v, scale = camera[1] * x, camera[2] * y, np.float32(1.0)
-    if camera[0] == 0.0:
-        if z <= 0.0:
-            return 4
-        u /= z
-        v /= z
-        scale = z
-    u += camera[3]
-    v += camera[4]
-    # Beyond the image its border speaks: it is free, unless the object left the field of view.
-    inside_u = min(max(u, np.float32(0.0)), np.float32(cells.shape[1] - 1))
-    inside_v = min(max(v, np.float32(0.0)), np.float32(cells.shape[0] - 1))
-    row, column = int(inside_v + np.float32(0.5)), int(inside_u + np.float32(0.5))
-    depth = cells[row, column, 0]
-    if depth == np.inf:
-        beyond = abs(u - inside_u) / camera[1] + abs(v - inside_v) / camera[2]
-        return 3 if cells[row, column, 1] + beyond * scale > tolerance else 4
-    if z - depth > tolerance:
-        return 4
-    if z - depth < -tolerance:
-        return 1
-    cosine = np.float32(0.0)
-    nx, ny, nz = normals[b, s, 0], normals[b, s, 1], normals[b, s, 2]
-    for r in range(3):
-        turned = turns[a, t, r, 0] * nx + turns[a, t, r, 1] * ny + turns[a, t, r, 2] * nz
-        cosine += cells[row, column, 1 + r] * turned
-    if cosine > AGREE_COSINE:
-        return 0
-    return 2 if cosine < CONTRADICT_COSINE else 4
-
-
-@njit(cache=True, nogil=True)
-def _score_all(
-    cells_i: Single,
-    camera_i: Single,
-    points_i: Single,
-    normals_i: Single,
-    hung_i: Single,
-    places_i: Single,
-    cells_j: Single,
-    camera_j: Single,
-    points_j: Single,
-    normals_j: Single,
-    hung_j: Single,
-    places_j: Single,
-    weights: Single,
-    looks: FloatArray,
-    tolerance: np.float32,
-    scores: Single,
-) -> None:
-    """Fill in scores (A, B, T); those given up, or with too little agreement, are left as they are.
-
-    The samples come in an order in which the first few are spread evenly.
-    """
-    num = min(points_i.shape[1], points_j.shape[1])
-    for a in range(scores.shape[0]):
-        for b in range(scores.shape[1]):
-            for t in range(scores.shape[2]):
-                total, agreed, look = np.float32(0.0), 0, 0
-                for s in range(num):
-                    if look < looks.shape[0] and s == looks[look, 0]:
-                        if total < 2 * s * looks[look, 1]:
-                            break
-                        look += 1
-                    there = _say(cells_j, camera_j, hung_j, places_j, points_i, normals_i,
-                                 (b, t, a, s), tolerance)  # fmt: skip
-                    back = _say(cells_i, camera_i, hung_i, places_i, points_j, normals_j,
-                                (a, t, b, s), tolerance)  # fmt: skip
-                    total += weights[there] + weights[back]
-                    agreed += int(there == 0) + int(back == 0)
-                else:
-                    if agreed >= MIN_SWEPT_AGREE * 2 * num:
-                        scores[a, b, t] = total / (2 * num)
