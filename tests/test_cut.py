@@ -13,6 +13,7 @@ from scanweld.evaluation.primitives import box, cylinder
 from scanweld.evaluation.turntable import EXACT, Shots, standing_room, turntable
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.scan import RangeScan, Viewpoint
+from scanweld.preparation.thinning import thinned
 from tests.scenes import random_motion, small_creature
 from tests.turntables import OBJECTS, SYMMETRIC, iou
 
@@ -62,6 +63,13 @@ def test_a_cut_scan_has_what_was_kept_and_says_so():
         kept = cut.kept[scan.name]
         assert scan.grid is not None and whole.grid is not None
         assert np.array_equal(scan.grid >= 0, kept)
+        assert scan.seen_beyond is not None
+        is_patch = ((whole.grid >= 0) & ~kept) ^ scan.seen_beyond  # smaller than the object
+        assert not (scan.seen_beyond & kept).any() and is_patch.sum() < 0.1 * is_patch.size
+        assert scan.content_hash() != replace(scan, seen_beyond=None).content_hash()
+        fewer = thinned(scan, scan.grid.size // 32)  # every second row and column
+        assert fewer.seen_beyond is not None
+        assert np.array_equal(fewer.seen_beyond, scan.seen_beyond[::2, ::2])
         assert np.array_equal(scan.points[scan.grid[kept]], whole.points[whole.grid[kept]])
         share = kept.sum() / (whole.grid >= 0).sum()
         assert scan.notes[-1] == f"cut: table and background, {share:.1%} of the pixels kept"

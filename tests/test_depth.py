@@ -205,11 +205,14 @@ def test_masks_and_depth_limits_cut_and_are_told(tmp_path: Path):
     scan = read(folder, masks=tmp_path / "masks")
     assert scan.grid is not None and scan.name == "frame-000007"
     np.testing.assert_array_equal(scan.grid >= 0, (mask > 0) & np.isfinite(DEPTH))
+    np.testing.assert_array_equal(scan.seen_beyond, (mask == 0) & np.isfinite(DEPTH))
     assert f"{100 * (mask > 0).sum() / np.isfinite(DEPTH).sum():.0f} % of it kept" in scan.notes[-1]
     limit = float(np.nanmedian(DEPTH))
     scan = read(folder, max_depth=limit)
     assert scan.points[:, 2].max() <= limit
     assert f"{(limit < DEPTH).sum()} points beyond" in scan.notes[-1]
+    np.testing.assert_array_equal(scan.seen_beyond, limit < DEPTH)
+    assert read(folder).seen_beyond is None
 
 
 def test_layouts_are_known_by_their_files(tmp_path: Path):

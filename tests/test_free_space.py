@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from scanweld.cut import with_only
 from scanweld.evaluation.scanner import scan_mesh
 from scanweld.evaluation.views import view_of
 from scanweld.geometry.arrays import BoolArray
@@ -84,6 +85,30 @@ def test_lost_returns_are_filled_or_unknown_never_free():
     assert (kind[patch] != PixelKind.SURFACE).mean() < 0.2 * lost
 
 
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_where_nothing_came_back_no_outline_is_known_if_the_background_did(share: float):
+    """A patch before a wall, with a bay into it, and a wide ring without return around both.
+
+    The wall may be seen to its end, or in so few pixels that it is out of reach for the most part.
+    """
+    patch, wall = bumps(200, 200, margin=60), np.full((200, 200), 400.0)
+    patch[90:110, 110:] = np.nan
+    v, u = np.mgrid[:200, :200]
+    wall[(np.maximum(abs(u - 99.5), abs(v - 99.5)) < 45) | (v > share * 200)] = np.nan
+    kept = np.isfinite(patch)
+    whole = scan_of_depth(np.where(kept, patch, wall))
+    cut, never = prepare(with_only(whole, kept), CONFIG), prepare(scan_of_depth(patch), CONFIG)
+    for scan in (cut, never):
+        assert all(kind_at(scan, *at) is PixelKind.FREE for at in ((122, 100), (57, 57), (52, 60)))
+    outside, is_free = cut.image.outside, cut.image.kind == PixelKind.FREE
+    if share < 0.5:
+        np.testing.assert_array_equal(outside, never.image.outside)
+        return
+    away = np.maximum(*(np.abs(each - 99.5) for each in xy_of(cut))) - 45  # of the ring's outside
+    assert not outside[away < -1].any() and (outside[is_free & (away > 1)] > 0).all()
+    assert (outside <= np.sqrt(2) * np.maximum(away + 2, 0)).all()
+
+
 def notched(width: int) -> BoolArray:
     mask = np.zeros((80, 80), dtype=bool)
     mask[20:60, 20:60] = True
@@ -94,8 +119,8 @@ def notched(width: int) -> BoolArray:
 def test_a_narrow_notch_is_unknown_a_wide_one_free():
     """A gap narrower than twice the closing radius may as well be a shadow."""
     everywhere = np.ones((80, 80), dtype=bool)
-    narrow, _ = classify_pixels(notched(6), everywhere, 5.0)
-    wide, outside = classify_pixels(notched(24), everywhere, 5.0)
+    narrow, _ = classify_pixels(notched(6), everywhere, ~everywhere, 5.0)
+    wide, outside = classify_pixels(notched(24), everywhere, ~everywhere, 5.0)
     assert narrow[25, 40] == PixelKind.UNKNOWN
     assert wide[25, 40] == PixelKind.FREE
     assert outside[25, 40] == pytest.approx(12, abs=1.5)

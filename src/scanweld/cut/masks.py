@@ -52,4 +52,20 @@ def with_only(scan: RangeScan, kept: BoolArray) -> RangeScan:
     is_kept[scan.grid[on]] = True
     share = on.sum() / max(int((scan.grid >= 0).sum()), 1)
     note = f"cut: table and background, {share:.1%} of the pixels kept"
-    return replace(scan.only(is_kept), notes=(*scan.notes, note))
+    beyond = _background((scan.grid >= 0) & ~on, int(on.sum()))
+    beyond = beyond if scan.seen_beyond is None else beyond | scan.seen_beyond
+    return replace(scan.only(is_kept), seen_beyond=beyond, notes=(*scan.notes, note))
+
+
+def _background(cut_off: BoolArray, num_kept: int) -> BoolArray:
+    """What was cut off in patches larger than the object (H, W): smaller ones may be parts of it.
+
+    A part before which nothing came back all around is cut off with the table.
+    """
+    from scipy import ndimage
+
+    patch = np.zeros(cut_off.shape, dtype=np.int64)
+    ndimage.label(cut_off, np.ones((3, 3)), output=patch)
+    size = np.bincount(patch.ravel())
+    size[0] = 0
+    return (size > num_kept)[patch]

@@ -33,7 +33,8 @@ class RangeImage:
         normals: (H, W, 3) unit, towards the sensor; NaN where there is no surface.
         kind: (H, W) PixelKind as uint8.
         outside: (H, W) distance of a free pixel from the closed silhouette, as a length on the
-            object; 0 inside the silhouette.
+            object; 0 inside the silhouette. To this belongs what is beside it where nothing came
+            back, if the sensor saw what lies behind elsewhere.
         is_rim: (H, W) surface pixels at a depth jump, a hole or the silhouette, and next to them.
         is_reliable: (H, W) surface pixels off the rim and not seen at grazing incidence: where a
             normal can be trusted.

@@ -32,6 +32,9 @@ class RangeScan:
         points: (N, 3), finite, scan frame, unit of the file.
         grid: (H, W) index of each cell's point, -1 where nothing was seen; or None.
             Of 32 bits, whatever is given.
+        seen_beyond: (H, W) cells in which the sensor saw what lies behind, and was cut off: there
+            is nothing before it. In other empty cells nothing came back, which says nothing. None
+            where nothing was cut off: an empty cell may be either.
         faces: (M, 3) indices of points, where the file was a mesh; or None.
         normals: (N, 3) or None, as the file gave them.
         colors: (N, 3) uint8 or None.
@@ -52,6 +55,7 @@ class RangeScan:
     name: str
     points: FloatArray
     grid: IndexArray | None = None
+    seen_beyond: BoolArray | None = None
     faces: IntArray | None = None
     normals: FloatArray | None = None
     colors: ByteArray | None = None
@@ -73,6 +77,9 @@ class RangeScan:
             if np.size(self.grid) and (np.max(self.grid) >= n or np.min(self.grid) < -1):
                 raise ValueError("the grid names points that do not exist")
             put("grid", frozen(self.grid, np.int32, (None, None)))
+        if self.seen_beyond is not None:
+            shape = (-1,) if self.grid is None else self.grid.shape
+            put("seen_beyond", frozen(self.seen_beyond, np.bool_, shape))
         if self.faces is not None:
             put("faces", frozen(self.faces, np.int64, (None, 3)))
             if self.faces.size and (self.faces.max() >= n or self.faces.min() < 0):
@@ -134,6 +141,8 @@ class RangeScan:
         parts = (self.points, grid, self.faces, self.normals, self.colors, self.confidence)
         for part in parts:
             digest.update(b"-" if part is None else repr(part.shape).encode() + part.tobytes())
+        if self.seen_beyond is not None:
+            digest.update(np.packbits(self.seen_beyond).tobytes())
         digest.update(repr(self.camera).encode())
         if self.scan_from_sensor is not None:
             digest.update(self.scan_from_sensor.matrix().tobytes())

@@ -57,9 +57,9 @@ def make_range_image(
     pixel = _pixel_size(spacing, diameter, config) if organised else spacing
     margin = (config.closing_diameters + MARGIN_DIAMETERS) * diameter
     camera, depth, mesh = render_surface(scan, points, spacing, pixel, margin, config)
-    kind, outside = classify_pixels(
-        np.isfinite(depth), _in_view(scan, camera), config.closing_diameters * diameter / pixel
-    )
+    closing = config.closing_diameters * diameter / pixel
+    in_view, blind = _in_view(scan, camera), _blind(scan, camera)
+    kind, outside = classify_pixels(np.isfinite(depth), in_view, blind, closing)
     normals, is_rim = normals_image(depth, mesh), rim_pixels(depth, mesh, config.rim_pixels)
     with np.errstate(invalid="ignore"):
         is_facing = incidence_cosines(camera, depth, normals) > config.min_cosine
@@ -305,9 +305,29 @@ def _in_view(scan: RangeScan, camera: Camera) -> BoolArray:
     """Working pixels (H, W) that lie in the scan's own field of view; all, where it is unknown."""
     if scan.camera is None:
         return np.ones((camera.height, camera.width), dtype=bool)
-    rays = camera.unproject_image(np.ones((camera.height, camera.width)))
-    pixels, _ = scan.camera.project(rays)
-    u, v = pixels[..., 0], pixels[..., 1]
+    u, v = _own_pixels(scan.camera, camera)
     # Up to the outermost pixels' centres, as the surface: no gap opens between it and the border.
     inside_u = (u >= -1e-6) & (u <= scan.camera.width - 1 + 1e-6)
     return inside_u & (v >= -1e-6) & (v <= scan.camera.height - 1 + 1e-6)
+
+
+def _blind(scan: RangeScan, camera: Camera) -> BoolArray:
+    """Working pixels (H, W) in which what lies behind was not seen, where most of it was.
+
+    Else it is out of the sensor's reach, and pixels are empty because they look at it.
+    """
+    none = np.zeros((camera.height, camera.width), dtype=bool)
+    if scan.seen_beyond is None or scan.camera is None or scan.grid is None:
+        return none
+    if (scan.grid < 0).sum() > 2 * scan.seen_beyond.sum():
+        return none
+    u, v = _own_pixels(scan.camera, camera)
+    column = np.clip(np.rint(u), 0, scan.camera.width - 1).astype(np.int64)
+    row = np.clip(np.rint(v), 0, scan.camera.height - 1).astype(np.int64)
+    return ~scan.seen_beyond[row, column]
+
+
+def _own_pixels(own: Camera, camera: Camera) -> tuple[FloatArray, FloatArray]:
+    """Where the pixels (H, W) of a working camera lie in the scan's own image: columns and rows."""
+    pixels, _ = own.project(camera.unproject_image(np.ones((camera.height, camera.width))))
+    return pixels[..., 0], pixels[..., 1]

@@ -7,29 +7,46 @@ from scanweld.geometry.prepared import PixelKind
 
 
 def classify_pixels(
-    is_surface: BoolArray, in_view: BoolArray, closing_pixels: float
+    is_surface: BoolArray, in_view: BoolArray, blind: BoolArray, closing_pixels: float
 ) -> tuple[ByteArray, FloatArray]:
     """Kinds of the pixels, and how far the free ones lie from the closed silhouette.
 
     Only pixels outside the closed and filled silhouette are free: gaps in it may be dropouts or
     shadows as well as air. Nothing is free beyond the field of view, nor in gaps that its border
-    cuts off.
+    cuts off. Where it is known that nothing came back the outline may lie anywhere: what is free
+    there has no distance from it, and what is free beyond has the distance from all of this.
 
     Args:
         is_surface: (H, W) pixels with a depth; the border, as wide as the closing, is empty.
         in_view: (H, W) pixels that the sensor could see at all.
+        blind: (H, W) pixels off the surface of which it is known that nothing came back.
         closing_pixels: Radius of the closing.
 
     Returns:
-        Kinds (H, W) and distances (H, W) in pixels, 0 inside the silhouette.
+        Kinds (H, W) and distances (H, W) in pixels, 0 inside the silhouette and where blind.
     """
     silhouette = close(is_surface, closing_pixels)
     is_free = _surroundings(in_view & ~silhouette, in_view)
     kind = np.full(is_surface.shape, PixelKind.UNKNOWN, dtype=np.uint8)
     kind[is_free] = PixelKind.FREE
     kind[is_surface] = PixelKind.SURFACE
-    outside = distance_to(silhouette | (in_view & ~is_free))
-    return kind, np.where(is_free, outside, 0.0)
+    grown = _joined(silhouette, blind & is_free)
+    outside = distance_to(grown | (in_view & ~is_free))
+    return kind, np.where(is_free & ~blind, outside, 0.0)
+
+
+def _joined(silhouette: BoolArray, blind: BoolArray) -> BoolArray:
+    """A silhouette (H, W) with the blind regions (H, W) that touch it."""
+    from scipy import ndimage
+
+    if not blind.any():
+        return silhouette
+    region = np.zeros(blind.shape, dtype=np.int64)
+    ndimage.label(blind, np.ones((3, 3)), output=region)
+    beside = np.asarray(ndimage.binary_dilation(silhouette, np.ones((3, 3))), dtype=np.bool_)
+    touches = np.bincount(region[beside], minlength=int(region.max()) + 1) > 0
+    touches[0] = False
+    return silhouette | touches[region]
 
 
 def _surroundings(empty: BoolArray, in_view: BoolArray) -> BoolArray:

@@ -38,11 +38,13 @@ def _strided(scan: RangeScan, grid: IndexArray, max_points: int) -> tuple[RangeS
     while (count := int((grid[::step, ::step] >= 0).sum())) > max_points:
         step += 1
     if count == 0:
-        return _in_cubes(replace(scan, grid=None, camera=None), max_points)
+        return _in_cubes(replace(scan, grid=None, seen_beyond=None, camera=None), max_points)
     coarse = np.ascontiguousarray(grid[::step, ::step])
     kept = np.zeros(len(scan.points), dtype=bool)
     kept[coarse[coarse >= 0]] = True
-    smaller = replace(scan, grid=coarse, faces=None, camera=_strided_camera(scan.camera, step))
+    beyond = None if scan.seen_beyond is None else scan.seen_beyond[::step, ::step]
+    camera = _strided_camera(scan.camera, step)
+    smaller = replace(scan, grid=coarse, seen_beyond=beyond, faces=None, camera=camera)
     return smaller.only(kept), f"one row and column in {step}"
 
 
@@ -78,7 +80,7 @@ def _in_cubes(scan: RangeScan, max_points: int) -> tuple[RangeScan, str]:
     chosen = _central(along, edge, cube_of)
     kept = np.zeros(len(along), dtype=bool)
     kept[chosen] = True
-    smaller = replace(scan, faces=None, grid=None).only(kept)
+    smaller = replace(scan, faces=None, grid=None, seen_beyond=None).only(kept)
     if scan.faces is not None:
         number = np.cumsum(kept) - 1
         faces = number[chosen[cube_of]][scan.faces]

@@ -59,6 +59,7 @@ def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
     if not seen.any():
         raise ReadError(f"{path}: no pixel has a depth; leave it out")
     notes += (f"{100 * (1 - seen.mean()):.0f} % of the pixels are without return",)
+    whole = depth
     depth, cut = _without_far(path, depth, settings.max_depth)
     notes += cut
     if settings.mask is not None:
@@ -70,10 +71,12 @@ def read_frame(path: Path, name: str, settings: FrameSettings) -> RangeScan:
         colors, told = colors_for(settings.color, shape, is_scaled=settings.is_color_scaled)
         notes += (told,)
     if lens := settings.intrinsics.distortion:
-        depth = undistorted(depth, camera, lens)
+        depth, whole = undistorted(depth, camera, lens), undistorted(whole, camera, lens)
         colors = None if colors is None else undistorted_colors(colors, camera, lens)
         notes += ("lens distortion undone",)
     scan = scan_of_depth(name, depth, camera, notes)
+    if settings.max_depth is not None or settings.mask is not None:
+        scan = replace(scan, seen_beyond=np.isfinite(whole) & np.isnan(depth))
     return scan if colors is None else replace(scan, colors=colors[np.isfinite(depth)])
 
 
