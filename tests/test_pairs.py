@@ -11,14 +11,24 @@ from scanweld.evaluation.primitives import box
 from scanweld.evaluation.views import view_of
 from scanweld.evidence.icp import IcpSchedule, icp
 from scanweld.evidence.information import information_of
-from scanweld.evidence.visibility import pose_rows
+from scanweld.evidence.visibility import (
+    AGREE,
+    CONTRADICT,
+    FREE,
+    FRONT,
+    GRAZING,
+    UNKNOWN,
+    count_evidence,
+    kernel_view,
+    pose_rows,
+)
 from scanweld.geometry.camera import CameraModel
 from scanweld.geometry.pose import Pose, random_rotation
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.heat.features import Features, describe
 from scanweld.pairs.anchors import even_anchors, pair_anchors
 from scanweld.pairs.distinct import distinct_poses
-from scanweld.pairs.hypotheses import Anchors, sweep
+from scanweld.pairs.hypotheses import SWEEP_WEIGHTS, Anchors, sweep
 from scanweld.pairs.problem import to_pose
 from scanweld.pairs.register import register_pair
 from scanweld.pairs.result import PairKind, PairResult
@@ -244,6 +254,29 @@ def test_the_sweep_finds_hypotheses_near_the_truth_and_without_anchors_none():
     assert rows.shape == (0, 12) and scores.shape == (0,)
     result = register_pair(pair.problem(), [(none, none)])
     assert result.kind is PairKind.NO_OVERLAP and result.best is None
+
+
+@pytest.mark.parametrize(("model", "count"), [(PINHOLE, 64), (ORTHOGRAPHIC, 20)])
+def test_hypotheses_are_scored_by_what_the_evidence_says_of_as_many_samples(
+    model: CameraModel, count: int
+):
+    pair = creature_pair(30, model)
+    fields = [
+        replace(f, points=f.points[:count], normals=f.normals[:count], diameter=0.1 * f.diameter)
+        for f in pair.fields  # Of so small a diameter the sweep's image is no coarser
+    ]
+    a, b = (even_anchors(field, CONFIG.num_anchors) for field in pair.fields)
+    tolerance = 0.04 * pair.diameter
+    rows, scores = sweep(*fields, a, b, 12, tolerance, 300)
+    assert len(rows) > 20
+    counts = count_evidence(
+        *kernel_view(fields[0]), *kernel_view(fields[1]), rows, count, tolerance
+    ).sum(axis=1)
+    weights = np.zeros(8)
+    weights[[AGREE, FRONT, CONTRADICT, FREE, UNKNOWN]] = SWEEP_WEIGHTS
+    weights[GRAZING] = weights[FREE]
+    # But for a few samples that lie on an edge of a pixel, in single precision.
+    assert np.mean(np.isclose(counts @ weights / (2 * count), scores)) > 0.9
 
 
 def test_even_anchors_leave_no_part_of_a_scan_out():

@@ -30,15 +30,23 @@ def kernel_digest(package: Path = PACKAGE) -> str:
 
 def kernel_files(package: Path = PACKAGE) -> set[Path]:
     """The files of a package that define kernels, and those that they import, and so on."""
-    files = set(_python_files(package))
+    contents = {path: path.read_bytes() for path in _python_files(package)}
+    modules = {_module(path.relative_to(package.parent)): path for path in contents}
     found: set[Path] = set()
-    left = [path for path in files if b"njit" in path.read_bytes()]
+    left = [path for path, content in contents.items() if b"njit" in content]
     while left:
         path = left.pop()
         if path not in found:
             found.add(path)
-            left += [other for other in _imports(path, package) if other in files]
+            names = _imports(contents[path].decode("utf-8"))
+            left += [modules[name] for name in names if name in modules]
     return found
+
+
+def _module(place: Path) -> str:
+    """The full name of a module, or of a package, by its place below the folder of them all."""
+    parts = place.with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def _python_files(package: Path) -> Iterator[Path]:
@@ -54,12 +62,9 @@ def _digest(package: Path, files: Iterable[Path]) -> str:
     return total.hexdigest()
 
 
-def _imports(path: Path, package: Path) -> Iterator[Path]:
-    """Where the modules are that a file imports by their full names, if they are of the package."""
-    for module, names in _IMPORT.findall(path.read_text(encoding="utf-8")):
-        for name in [module, *(f"{module}.{name}" for name in _NAME.findall(names))]:
-            parts = name.split(".")
-            if parts[0] == package.name:
-                place = package.joinpath(*parts[1:])
-                yield place.with_suffix(".py")
-                yield place / "__init__.py"
+def _imports(text: str) -> Iterator[str]:
+    """The full names of all that may be a module among what a file imports."""
+    for module, names in _IMPORT.findall(text):
+        yield module
+        for name in _NAME.findall(names):
+            yield f"{module}.{name}"

@@ -2,7 +2,6 @@
 
 import logging
 
-import fast_simplification
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.spatial import KDTree
@@ -144,6 +143,8 @@ def decimated(
     """
     if num_faces >= len(faces):
         return vertices, faces, filled
+    import fast_simplification  # few runs want it, and it takes 30 ms to import
+
     # In units of the mesh itself: the library's thresholds are absolute.
     middle, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
     simplified = fast_simplification.simplify(
