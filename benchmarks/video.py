@@ -7,6 +7,7 @@
 - long: the same there and back, 1,000 frames in all, for time and memory.
 - noise: a simulated way through a room, with exact truth.
 - objects: made objects on a table, 300 simulated frames once around each, to a model.
+- room: the room of noise, 200 frames to a model, beside Open3D on the same frames.
 """
 
 import argparse
@@ -25,6 +26,8 @@ from benchmarks.captures import depth_frames, kept_records, parser_of
 from benchmarks.kept import warn_of_old_calibration
 from benchmarks.results import Json, write_results
 from benchmarks.sets import data_folder
+from benchmarks.study.optional import is_usable
+from benchmarks.surface.open3d_video import reconstructed
 from benchmarks.surface.surface_distances import surface_distances
 from benchmarks.virtual.bodies import make_body
 from benchmarks.virtual.handheld import (
@@ -38,6 +41,7 @@ from benchmarks.virtual.handheld import (
     together,
 )
 from scanweld.app.video_job import take_video
+from scanweld.config import Config
 from scanweld.cut.frames import depth_image
 from scanweld.cut.smoothing import trimmed_rms
 from scanweld.geometry.arrays import FloatArray
@@ -50,6 +54,7 @@ from scanweld.io.depth.capture import DepthImages, DepthOptions, Frame
 from scanweld.io.poses import read_poses
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline.run import run
+from scanweld.reconstruction import Reconstruction
 from scanweld.video.keyframes import keyframes
 from scanweld.video.noise import depth_noise
 from scanweld.video.records import Fate, Keyframe, Log, VideoFrame
@@ -60,11 +65,14 @@ from scanweld.work.threads import single_threaded_algebra
 NUM_NOISE, NUM_AROUND, TURN_DEG = 60, 300, 350.0
 DISTANCE, SIZE = 0.5, 0.2
 """Of the camera from the object, and its largest extent, in metres."""
+NUM_ROOM, ROOM_VOXEL = 200, 3.0 / 512
+"""Frames of the room, one a degree; and the voxels of Open3D's own example, in metres."""
 
 
 def main() -> int:
     """Measure; print a line for each record."""
     parts = {"kitchen": kitchen, "long": long, "noise": noise, "objects": objects}
+    parts["room"] = room_model
     parser = parser_of("Video of depth cameras.", "part", parts)
     add = parser.add_argument
     add("--frames", type=int, default=1000, help="of the long video")
@@ -86,7 +94,7 @@ def main() -> int:
 
 def by_part(records: Sequence[Json]) -> Json:
     """The records of each part."""
-    parts = ("kitchen", "long", "noise", "objects")
+    parts = ("kitchen", "long", "noise", "objects", "room")
     return {part: [record for record in records if record["part"] == part] for part in parts}
 
 
@@ -196,14 +204,8 @@ def _object(kind: str, seed: int, options: argparse.Namespace) -> Json:
     poses = around(middle, DISTANCE, np.linspace(0.0, options.turn, count), rng)
     truth = {f"{k:04d}": pose for k, pose in enumerate(poses)}
     found, log, seconds = _tracked(_simulated(body, truth, camera), camera)
-    scans = [_scan(each, camera) for each in found]
-    starts = {each.name: each.piece_from_keyframe for each in found}
-    pieces = [
-        tuple(each.name for each in found if each.piece == k) for k in range(len(log.breaks) + 1)
-    ]
-    start = PoseSet(poses=starts, components=tuple(pieces))
     began = time.process_time()
-    result = run(scans, knowledge=Knowledge(start=start), workers=options.workers)
+    result = _registered(found, log, camera, options.workers, Config())
     mesh = result.mesh or result.preview
     record: Json = {
         "object": f"{kind} {seed}",
@@ -222,12 +224,60 @@ def _object(kind: str, seed: int, options: argparse.Namespace) -> Json:
     }
     if mesh is None:
         return record
-    reference = result.components[0][0]
-    placed = truth[reference].apply(result.poses[reference].inverse().apply(mesh.vertices))
+    placed = _placed(mesh, result, truth)
     near = (placed[:, 2] > 0.01) & (np.abs(placed[:, :2]) < SIZE).all(axis=1)
     off = surface_distances(placed[near], body)
     middle_mm, most_mm = 1e3 * np.quantile(off, [0.5, 0.95])
     return {**record, "median_mm": float(middle_mm), "most_mm": float(most_mm)}
+
+
+def room_model(options: argparse.Namespace) -> Iterator[Json]:
+    """A way around a table in a room, to a model, beside Open3D on the very same frames."""
+    rng, camera = np.random.default_rng(0), pinhole(options.pixels)
+    scene = together([room(rng), table_with(make_body("thing", 0).mesh, 0.3)])
+    turns = np.linspace(0.0, NUM_ROOM * 1.0, NUM_ROOM)
+    poses = around(np.array([0.0, 0.0, 0.85]), 1.0, turns, rng)
+    truth = {f"{k:04d}": pose for k, pose in enumerate(poses)}
+    frames = list(_simulated(scene, truth, camera))
+    began = time.process_time()
+    found, log, _ = _tracked(frames, camera)
+    result = _registered(found, log, camera, options.workers, Config(object="all"))
+    mesh, seconds = result.mesh or result.preview, time.process_time() - began
+    common: Json = {"frames": len(frames), "pixels": options.pixels}
+    if mesh is not None:
+        ours = _placed(mesh, result, truth)
+        told = {"keyframes": len(found), "placed": len(result.poses)}
+        told |= {"components": len(result.components), "verdict": result.verdict.value}
+        yield {**common, "by": "scanweld", **_apart(ours, scene), "cpu_seconds": seconds, **told}
+    if is_usable("open3d"):
+        began = time.process_time()
+        mesh, _ = reconstructed([frame.depth for frame in frames], camera, ROOM_VOXEL)
+        seconds, theirs = time.process_time() - began, poses[0].apply(mesh.vertices)
+        yield {**common, "by": "Open3D", **_apart(theirs, scene), "cpu_seconds": seconds}
+
+
+def _apart(points: FloatArray, scene: TriangleMesh) -> Json:
+    off = 1e3 * surface_distances(points, scene, num_samples=1_000_000)
+    return dict(zip(("median_mm", "most_mm"), np.quantile(off, [0.5, 0.95]).tolist(), strict=True))
+
+
+def _registered(
+    found: Sequence[Keyframe], log: Log, camera: Camera, workers: int, config: Config
+) -> Reconstruction:
+    """Keyframes as scans, run as ``scanweld run --video`` does."""
+    pieces = [
+        tuple(each.name for each in found if each.piece == k) for k in range(len(log.breaks) + 1)
+    ]
+    starts = {each.name: each.piece_from_keyframe for each in found}
+    start = PoseSet(poses=starts, components=tuple(pieces))
+    scans = [_scan(each, camera) for each in found]
+    return run(scans, config, knowledge=Knowledge(start=start), workers=workers)
+
+
+def _placed(mesh: TriangleMesh, result: Reconstruction, truth: dict[str, Pose]) -> FloatArray:
+    """The vertices of a model where the pose of its first scan is the true one."""
+    reference = result.components[0][0]
+    return truth[reference].apply(result.poses[reference].inverse().apply(mesh.vertices))
 
 
 def _simulated(scene: TriangleMesh, truth: dict[str, Pose], camera: Camera) -> Iterator[VideoFrame]:

@@ -62,7 +62,7 @@ def tsdf(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
         image = geometry.Image(depth)
         how = (image, lens, pose, 1.0, 2.0 * float(depth.max()), TRUNCATION_VOXELS)
         grid.integrate(grid.compute_unique_block_coordinates(*how), *how)
-    return _converted(grid.extract_triangle_mesh(weight_threshold=0.0).to_legacy())
+    return converted(grid.extract_triangle_mesh(weight_threshold=0.0).to_legacy())
 
 
 def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
@@ -77,7 +77,7 @@ def poisson(shapes: Sequence[Shape], voxel: float) -> TriangleMesh:
     )
     apart = o3d.geometry.PointCloud(mesh.vertices).compute_point_cloud_distance(cloud)
     mesh.remove_vertices_by_mask(np.asarray(apart) > POISSON_REACH_VOXELS * voxel)
-    return _converted(mesh)
+    return converted(mesh)
 
 
 def _as_pinhole(shape: Shape) -> Shape:
@@ -94,7 +94,8 @@ def _as_pinhole(shape: Shape) -> Shape:
     return shape._replace(camera=camera, depth=depth, world_from_sensor=moved)
 
 
-def _converted(mesh: Any) -> TriangleMesh:
+def converted(mesh: Any) -> TriangleMesh:
+    """A mesh of Open3D as one of ours, every vertex once."""
     mesh.remove_duplicated_vertices()
     mesh.remove_unreferenced_vertices()
     return TriangleMesh(vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.triangles))
