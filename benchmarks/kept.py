@@ -25,7 +25,10 @@ _JUDGING = (f"benchmarks/judging/{name}.py" for name in ("outcomes", "trial"))
 _SCENES = ("src/scanweld/**/*.py", "benchmarks/virtual/*.py", *_JUDGING)
 COLLECTED = (*_SCENES, *(f"benchmarks/calibration/{n}.py" for n in ("solids", "scenes", "collect")))
 """The code that makes, registers and judges the sets of the calibration."""
-CALIBRATED = (*COLLECTED, *(f"benchmarks/calibration/{name}.py" for name in ("fit", "learn")))
+CALIBRATED = (
+    *COLLECTED,
+    *(f"benchmarks/calibration/{name}.py" for name in ("bounds", "fit", "learn")),
+)
 """The same, and what learns from them."""
 TRUSTED = (*_SCENES, "src/scanweld/**/*.json")
 """The code that makes, registers and judges the runs of trust, and the calibration it has."""

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from scanweld.config import PrepareConfig
-from scanweld.geometry.gauss_newton import lever_arm
+from scanweld.geometry.gauss_newton import jacobian, lever_arm
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.preparation import prepare
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
-from scanweld.sensor.accuracy import pose_deviations
+from scanweld.sensor.accuracy import carried_twist, pose_deviations
 from scanweld.sensor.model import SensorModel
 from tests.scenes import creature_scene, random_motion
 
@@ -89,5 +89,19 @@ def test_shared_errors_count_more_than_noise_and_neither_world_nor_pairs_order_m
     world = random_motion(np.random.default_rng(4), 100.0)
     for k, one in deviations(ring, world=world, correlated=1e-3, white=1e-3).items():
         other = deviations(ring, correlated=1e-3, white=1e-3)[k]
-        assert one.angle_deg == pytest.approx(other.angle_deg, rel=0.1)
-        assert one.shift == pytest.approx(other.shift, rel=0.1)
+        assert one.angle_deg == pytest.approx(other.angle_deg, rel=1e-6)
+        assert one.shift == pytest.approx(other.shift, rel=1e-6)
+
+
+def test_a_twist_about_one_point_moves_points_like_the_one_it_is_carried_to():
+    rng = np.random.default_rng(5)
+    points, directions, (here, there) = *rng.normal(size=(2, 20, 3)), rng.normal(size=(2, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    about_here = jacobian(points, directions, here, 2.0)
+    carried = jacobian(points, directions, there, 2.0) @ carried_twist(here - there, 2.0)
+    np.testing.assert_allclose(about_here, carried, atol=1e-12)
+
+
+def test_scans_without_any_error_have_poses_almost_without_any(ring: Ring):
+    for one in deviations(ring, white=0.0, correlated=0.0).values():
+        assert 0 < one.shift < 1e-3 * ring[2] and np.isfinite(one.angle_deg)

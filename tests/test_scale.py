@@ -37,10 +37,12 @@ def placed(factor: float, unit: float = 1.0) -> tuple[list[PreparedScan], dict[i
     return scans, refine_poses(scans, poses, list(combinations(poses, 2)), RefineConfig()).poses
 
 
-def scales_of(scans: list[PreparedScan], poses: Mapping[int, Pose]) -> dict[int, ScaleEstimate]:
-    """By a sensor that is known to be as exact as those of the scans are."""
+def scales_of(
+    scans: list[PreparedScan], poses: Mapping[int, Pose], times: float = 1.0
+) -> dict[int, ScaleEstimate]:
+    """By a sensor that is known to err so many times as much as those of the scans do."""
     diameter = float(np.median([scan.diameter for scan in scans]))
-    white, correlated = 7e-4 * diameter, 1e-4 * diameter
+    white, correlated = times * 7e-4 * diameter, times * 1e-4 * diameter
     sensor = SensorModel(
         num_certain=9,
         sigma=white,
@@ -99,6 +101,13 @@ def test_the_unit_of_all_does_not_matter():
     mm, m = estimates(1.01), estimates(1.01, 1e-3)
     for k, estimate in mm.items():
         assert m[k].factor == pytest.approx(estimate.factor, abs=1e-4)
+        assert m[k].deviation == pytest.approx(estimate.deviation, rel=0.01)
+
+
+def test_the_coarser_the_sensor_the_less_sure_are_scales():
+    exact, coarse = estimates(1.01), scales_of(*placed(1.01), 10.0)
+    assert all(coarse[k].deviation > 3.0 * exact[k].deviation for k in exact)
+    assert exact[2].is_off and not coarse[2].is_off
 
 
 def test_an_uncertain_scale_is_no_accusation_and_words_give_the_factor_to_apply():

@@ -173,6 +173,7 @@ def test_patches_in_free_space_are_held_to_what_certain_pairs_show(
     [
         ([0.0] * 7 + [0.04, 0.05], 0.0),  # a part that moved is missing from two pairs
         ([0.0, 0.01, 0.02, 0.03, 0.04, 0.05], 0.05),  # borders that were cut anyhow
+        ([0.01, 0.012, 0.011, 0.013, 0.012, 0.2], 0.01725),  # both
     ],
 )
 def test_what_few_certain_pairs_show_far_more_of_is_not_excused(
@@ -201,7 +202,9 @@ def test_cycles_tell_how_far_pairs_are_off(found: tuple[PreparedPair, PairResult
             off[0] += wrong * diameter * (n == 0)
             best = replace(result.alternatives[0], i_from_j=Pose.exp([0, 0, 0, *off]))
             pairs[i, j] = replace(result, i=i, j=j, alternatives=(best,))
-        return closure_of(pairs, fields, diameter).displacement / diameter
+        closure = closure_of(pairs, fields, diameter)
+        assert wrong or closure.num_cycles == len(edges) - (num_scans - 1)
+        return closure.displacement / diameter
 
     assert closed(0.0) == 0.0
     assert closed(0.01) == pytest.approx(0.01, rel=0.6)
@@ -225,6 +228,8 @@ def test_bent_depth_that_pairs_hide_widens_what_is_compared(
     assert bent.sigma > 0.005 * pair.diameter and bent.correlated == sensor.correlated
     assert 0.005 * pair.diameter < bent.misclosure < 0.01 * pair.diameter
     assert 0 < sensor.misclosure < 0.005 * pair.diameter, "usual, where no cycle closes"
+    told = replace(sensor, white=3.0, correlated=4.0, closure=20.0, num_cycles=2)
+    assert told.misclosure == pytest.approx(np.sqrt((10.0**2 + 20.0**2) / 2))
     assert "around cycles" in bent.words() and "around cycles" not in sensor.words()
     assert sensor.tolerance < bent.tolerance <= 0.03 * pair.diameter + 1e-9
     assert bent.reach > 2.0 * sensor.reach

@@ -21,7 +21,7 @@ QUANTILES = tuple(np.linspace(HELD, 0.995, 10).tolist())
 FLOORS = (0.0, *np.geomspace(0.25, 16.0, 13).tolist())
 """and floors."""
 UNKNOWN = Bounds(rotation=4.0, translation=4.0, floor=1.0)
-"""Where too few scans are right."""
+"""Where no scan is right, or none of these suffice."""
 FARTHEST_TURN = lever_arm(1.0) * np.radians(RIVAL_ANGLE_DEG)
 """Rotations by which poses are rivals, as a share of the diameter."""
 LEAST = 1e-9

@@ -85,8 +85,8 @@ class ScanReport:
         rotation_bound_deg: Its rotation beside the others of its component is off by no more, at
             95 %, if it is placed rightly; None if unplaced.
         translation_bound: The same of its centroid, in the scans' unit.
-        deviation_deg: Standard deviation of its rotation by information and noise alone; None if
-            unplaced.
+        deviation_deg: Standard deviation of its rotation by information, noise and open cycles;
+            None if unplaced.
         deviation: The same of its centroid, in the scans' unit.
     """
 

@@ -1,8 +1,8 @@
 """Deviation of a scan's pose -> bounds of its errors that hold for 95 % of the scans.
 
-The deviation that follows from information and noise is too small where a sensor errs alike in all
-scans: no number of them averages that out. So bounds have a floor in proportion to what neighbours
-share of the error, and the calibration counts by how much.
+The deviation that follows from information, noise and open cycles is too small where a sensor errs
+alike in all scans: no number of them averages that out. So bounds have a floor in proportion to
+what neighbours share of the error, and the calibration counts by how much.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ class Bounds:
     Attributes:
         rotation: The factor of rotations, which count by the lengths at the lever arm.
         translation: The factor of translations.
-        floor: Of the error that neighbours share, so much is shared by all scans.
+        floor: Error that all scans share, over the one that neighbours share.
     """
 
     rotation: float
@@ -45,7 +45,7 @@ class Bounds:
         farthest = RIVAL_SHIFT_DIAMETERS * sensor.diameter
         bounds = {}
         for k, one in deviations.items():
-            turn = self.rotation * np.hypot(np.radians(one.angle_deg) * arm, floor) / arm
+            turn = self.rotation * np.hypot(one.angle * arm, floor) / arm
             bounds[k] = PoseTolerance(
                 angle_deg=min(float(np.degrees(turn)), RIVAL_ANGLE_DEG),
                 shift=min(self.translation * float(np.hypot(one.shift, floor)), farthest),

@@ -22,7 +22,7 @@ class Fit:
     Attributes:
         observability: Smallest over largest eigenvalue of the information.
         misfit: What is left of the distances between the surfaces when noise is averaged out, over
-            what they are where surfaces coincide (``SensorModel.sigma``); 1 where there are none.
+            what they are where surfaces coincide (``SensorModel.sigma``); infinite without any.
         coherence: Share of the contours that cohere.
     """
 
@@ -72,5 +72,5 @@ def diagnostics_of(
 
 
 def over(distance: float, sigma: float) -> float:
-    """A distance over the sensor's standard deviation; 1 where that is unknown."""
+    """A distance over the sensor's standard deviation; 1 of a sensor without error."""
     return distance / sigma if sigma > 0 else 1.0

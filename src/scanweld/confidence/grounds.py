@@ -17,7 +17,7 @@ Grounds = Mapping[str, float]
 LEAST_SHARE = 1e-3
 LEAST_OBSERVABILITY = 1e-7
 MAX_RATIO = 10.0
-"""Of residuals over what the sensor leaves of them, or the inverse: beyond, all say the same."""
+"""Of misfits over what the sensor leaves of them, or the inverse: beyond, all say the same."""
 MAX_CONTRADICTION = 2.0
 MIN_CORROBORATION = MIN_CONDUCTANCE
 """Conductance between two scans below which other pairs do not hold them together."""

@@ -1,1 +1,1 @@
-"""Poses of many scans refined together by surfaces and contours, and their scale."""
+"""Poses of many scans refined together by surfaces and contours."""

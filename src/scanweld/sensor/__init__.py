@@ -1,1 +1,1 @@
-"""What the set says of its sensor: noise, how far silhouettes can be believed, what stood still."""
+"""What the set says of its sensor: noise, silhouettes, what stood still, whose scale is off."""

@@ -2,8 +2,9 @@
 
 A sensor's noise averages out over a surface, its bent depth does not: neighbouring points are off
 together. So the points of a patch tell no more than the patch: its mean has the correlated error,
-and what is left of the noise. The information of all patches of all pairs (J^T J over the variance)
-makes the covariance of all poses at once, beside the component as a whole.
+and what is left of the noise. The information of all patches of a pair (J^T J over the variance)
+holds it no more firmly than cycles of pairs close; all pairs together make the covariance of all
+poses at once, beside the component as a whole.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -16,7 +17,7 @@ from scanweld.geometry.gauss_newton import jacobian, lever_arm
 from scanweld.geometry.matches import Matches
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
-from scanweld.refinement.refine import match_surfaces
+from scanweld.refinement.refine import SURFACE_NOISE_DIAMETERS, match_surfaces
 from scanweld.refinement.surface_terms import SurfaceSource
 from scanweld.sensor.learn import PATCH_DIAMETERS
 from scanweld.sensor.model import SensorModel
@@ -76,7 +77,7 @@ def _covariance(
     for (i, j), ways in _by_pair(found).items():
         between = 0.5 * (middles[i] + middles[j])
         firmness = _firmness(ways, poses, between, sensor)
-        by_i, by_j = (_carried(middles[k] - between, arm) for k in (i, j))
+        by_i, by_j = (carried_twist(middles[k] - between, arm) for k in (i, j))
         a, b = place[i], place[j]
         normal[a, a] += by_i.T @ firmness @ by_i
         normal[b, b] += by_j.T @ firmness @ by_j
@@ -109,12 +110,13 @@ def _firmness(
     """Inverse covariance (6, 6) of the twist between two scans, about a centre.
 
     However many points they share, bent depth leaves the pose as far off as cycles of pairs do
-    not close, alike in all six directions: that covariance is added to the points'.
+    not close: that covariance is added to the points', a sixth of a twist as long as the
+    misclosure in each direction.
     """
     diameter, information = sensor.diameter, np.zeros((6, 6))
     for j, matches in ways:
         points, directions = poses[j].apply(matches.points), poses[j].turn(matches.directions)
-        weights = match_weights(points, sensor)[:, None]
+        weights = match_weights(matches.points, sensor)[:, None]
         moves = jacobian(points, directions, centre, lever_arm(diameter))
         information += (weights * moves).T @ moves
     firm, directions = np.linalg.eigh(information)
@@ -122,7 +124,7 @@ def _firmness(
     return (directions * (firm / (1.0 + firm * sensor.misclosure**2 / 6.0))) @ directions.T
 
 
-def _carried(away: FloatArray, arm: float) -> FloatArray:
+def carried_twist(away: FloatArray, arm: float) -> FloatArray:
     """(6, 6) from the twist of a scan about its middle, (3,) from a centre, to that about this."""
     carried = np.eye(6)
     carried[3:, :3] = _cross(away) / arm
@@ -132,11 +134,17 @@ def _carried(away: FloatArray, arm: float) -> FloatArray:
 def match_weights(points: FloatArray, sensor: SensorModel) -> FloatArray:
     """One over the variance (N,) of matches; those of a patch together weigh as the patch does.
 
-    Matches come from both sides of a pair and say the same twice: each counts half.
+    Matches come from both sides of a pair and say the same twice: each counts half. No sensor is
+    so exact that its surfaces, which are facets, are more so.
+
+    Args:
+        points: (N, 3) in the frame of a sensor: where the world is does not matter.
+        sensor: What is known of the sensor.
     """
     cell, count = cells_of(points, PATCH_DIAMETERS * sensor.diameter)
     shared = count[cell] * sensor.correlated**2
-    return 0.5 / np.maximum(sensor.white**2 + shared, np.finfo(float).tiny)
+    least = (SURFACE_NOISE_DIAMETERS * sensor.diameter) ** 2
+    return 0.5 / np.maximum(sensor.white**2 + shared, least)
 
 
 def _without_common_motion(
@@ -144,7 +152,7 @@ def _without_common_motion(
 ) -> FloatArray:
     """Orthonormal basis (6 N, 6 N - 6) of twists that do not move the component as a whole."""
     centre = np.mean([middles[k] for k in order], axis=0)
-    common = np.vstack([_carried(centre - middles[k], arm) for k in order])
+    common = np.vstack([carried_twist(centre - middles[k], arm) for k in order])
     basis, _, _ = np.linalg.svd(common, full_matrices=True)
     return basis[:, 6:]
 

@@ -95,7 +95,7 @@ def learn_sensor(
 
 
 def _most_of_usual(values: Sequence[float]) -> float:
-    """The largest value that is not far out of the others (Tukey's outer fence).
+    """The largest value, but no more than is not far out of all (Tukey's outer fence).
 
     Where a part moved, it is missing from a few certain pairs too, though from most it is not.
     """

@@ -16,8 +16,8 @@ CLOSURE = (
 )
 USUAL_MISCLOSURE, USUAL_CYCLES = 2.0, 2
 """How far a pair moves a scan amiss as a rule, over the distance between surfaces that coincide
-(median of the sets of the calibration in which cycles close), and as how many cycles that counts
-beside those of the set."""
+(mean of the 33 sets of the calibration that have cycles), and as how many cycles that counts beside
+those of the set."""
 SPREAD_SIGMAS, NUM_SPREAD_BINS = 5.0, 41
 """How far the spread of the distances is told, in standard deviations, and in how many bins."""
 
@@ -75,7 +75,7 @@ class SensorModel:
     def misclosure(self) -> float:
         """How far the pose of one pair moves a scan amiss, in the scans' unit.
 
-        What cycles show, and what is usual of such surfaces beside it: the fewer cycles, the more.
+        What cycles show, and what is usual of such surfaces: that counts more, the fewer there are.
         """
         usual = USUAL_MISCLOSURE * math.hypot(self.white, self.correlated)
         squares = USUAL_CYCLES * usual**2 + self.num_cycles * self.closure**2

@@ -161,8 +161,10 @@ def _surface_terms(
     found = match_surfaces(sources, poses, pairs, MATCH_DIAMETERS * diameter, workers)
     noise = SURFACE_NOISE_DIAMETERS * diameter, 1.0
     terms = weighted_terms(found, [], poses, 0.0, noise)
+    back = {k: pose.inverse() for k, pose in poses.items()}
     return [
-        replace(term, weights=term.weights * match_weights(term.points, sensor)) for term in terms
+        replace(term, weights=term.weights * match_weights(back[term.j].apply(term.points), sensor))
+        for term in terms
     ]
 
 
