@@ -267,7 +267,7 @@ def test_hypotheses_are_scored_by_what_the_evidence_says_of_as_many_samples(
     ]
     a, b = (even_anchors(field, CONFIG.num_anchors) for field in pair.fields)
     tolerance = 0.04 * pair.diameter
-    rows, scores = sweep(*fields, a, b, 12, tolerance, 300)
+    rows, scores = sweep(fields[0], fields[1], a, b, 12, tolerance, 300)
     assert len(rows) > 20
     counts = count_evidence(
         *kernel_view(fields[0]), *kernel_view(fields[1]), rows, count, tolerance
