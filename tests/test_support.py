@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from scanweld.config import Config, PrepareConfig
+from scanweld.errors import InputError
 from scanweld.evaluation.primitives import box, sphere
 from scanweld.evaluation.scanner import NoiseModel, scan_mesh
 from scanweld.evaluation.turntable import joined
@@ -16,7 +17,7 @@ from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan
 from scanweld.knowledge.facts import Knowledge
 from scanweld.pipeline import preparations
-from scanweld.pipeline.intake import take_in
+from scanweld.pipeline.intake import require_two, take_in
 from scanweld.preparation import prepare, stands_on_support
 from scanweld.preparation.support import find_support
 from scanweld.work.progress import Event, NoCache, StageAdvanced, silent
@@ -131,3 +132,11 @@ def test_a_table_in_most_scans_is_left_out_of_these_unless_the_settings_keep_it(
     assert not any(scan.is_without_support for scan in (*few, *kept))
     hashes = {scan.work_hash for scan in (*mostly, *kept)}
     assert len(hashes) == 7, "work on a scan with its table is none on one without"
+
+
+def test_of_many_refused_scans_few_are_named():
+    refused = {f"frame_{k:03}": "it shows nothing" for k in range(300)}
+    with pytest.raises(InputError, match="0 usable scans; give at least 2") as error:
+        require_two([], refused)
+    assert "frame_000: it shows nothing" in str(error.value)
+    assert "more" in str(error.value) and len(str(error.value)) < 400

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from scanweld.config import Config
-from scanweld.errors import InputError
+from scanweld.errors import InputError, some_of
 from scanweld.geometry.prepared import PreparedScan
 from scanweld.geometry.scan import RangeScan, principal_diameter
 from scanweld.knowledge.by_index import IndexedKnowledge
@@ -126,7 +126,7 @@ def require_two(prepared: Sequence[PreparedScan], refused: Mapping[str, str]) ->
         InputError: If there are fewer than two.
     """
     if len(prepared) < 2:
-        told = "; ".join(f"{name}: {reason}" for name, reason in sorted(refused.items()))
+        told = some_of([f"{name}: {reason}" for name, reason in sorted(refused.items())])
         raise InputError(
             f"{len(prepared)} usable scan{'s' * (len(prepared) != 1)}; give at least 2"
             + (f" ({told})" if told else "")
