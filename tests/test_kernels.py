@@ -14,6 +14,7 @@ import scanweld
 from scanweld.app import first_run
 from scanweld.compiled import kernels, source
 from scanweld.compiled.kernels import provide_cache
+from scanweld.work.progress import StageStarted, silent
 
 # Numba tries a folder by a temporary file in it; here all but our own are read-only.
 READ_ONLY = """
@@ -184,11 +185,17 @@ def test_another_process_compiles_what_is_missing(
     assert set(first_run.KERNELS) >= set(first_run.missing_kernels())
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(first_run, "missing_kernels", lambda **_: [one])
-    with first_run.compiling_ahead(print, workers=2):
+    with first_run.compiling_ahead(print, workers=2) as starting:
+        progress = starting(silent)
+        progress(StageStarted(stage="read"))
+        assert not capsys.readouterr().out, "what is read may yet be refused"
+        progress(StageStarted(stage="prepare"))
         until = time.monotonic() + 60
         while not list(tmp_path.rglob("mesh.connected-*.nbc")) and time.monotonic() < until:
             time.sleep(0.1)
-    assert list(tmp_path.rglob("mesh.connected-*.nbi")) and "once" in capsys.readouterr().out
+    assert list(tmp_path.rglob("mesh.connected-*.nbi"))
+    assert "first run: 1 kernel is compiled, once" in capsys.readouterr().out
     monkeypatch.setattr(first_run, "missing_kernels", lambda **_: [])
-    with first_run.compiling_ahead(print):
+    with first_run.compiling_ahead(print) as starting:
+        starting(silent)(StageStarted(stage="prepare"))
         assert not capsys.readouterr().out, "nothing is said where nothing is missing"

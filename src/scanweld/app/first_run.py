@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
+from scanweld.work.progress import Event, Progress, StageStarted
 from scanweld.work.threads import num_workers
 
 MAX_PROCESSES = 4
@@ -69,6 +70,8 @@ VIDEO_KERNELS = {
     "video.average._add": "f8w2 f8w3 f8w1 f8w1 f8w1 f8 f8w2 f8w2 i4w2 i4w2",
 }
 """What the run of a video calls before all others."""
+WORKING_STAGES = ("video", "prepare")
+"""The first in which kernels are called."""
 
 
 def missing_kernels(*, of_video: bool = False) -> list[str]:
@@ -83,28 +86,52 @@ def missing_kernels(*, of_video: bool = False) -> list[str]:
 @contextmanager
 def compiling_ahead(
     tell: Callable[[str], object], workers: int | None = None, *, of_video: bool = False
-) -> Iterator[None]:
-    """Let other processes compile what is missing for as long as the context lasts.
+) -> Iterator[Callable[[Progress], Progress]]:
+    """Let other processes compile what is missing, from when scans are worked on.
+
+    By then what cannot be meant has been refused, in one line.
 
     Args:
         tell: Called with a line on it, if anything is missing.
         workers: Processes, this one among them; as many as there are cores if None.
         of_video: Whether the run is of a video.
+
+    Yields:
+        What makes the progress of a run start it; processes end with the context.
     """
-    missing = missing_kernels(of_video=of_video)
-    count = min(num_workers(workers), MAX_PROCESSES)
-    if not missing or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-        yield
-        return
-    seconds = SECONDS_A_KERNEL * len(missing) / count
-    tell(f"first run: {len(missing)} kernels are compiled, once; that takes some {seconds:.0f} s")
-    others = [_start(missing[::-1][k :: count - 1]) for k in range(count - 1)]
+    others: list[subprocess.Popen[bytes]] = []
+
+    def starting(progress: Progress) -> Progress:
+        waits = True
+
+        def told(event: Event) -> None:
+            nonlocal waits
+            if waits and isinstance(event, StageStarted) and event.stage in WORKING_STAGES:
+                waits = False
+                others.extend(_start_all(tell, workers, missing_kernels(of_video=of_video)))
+            progress(event)
+
+        return told
+
     try:
-        yield
+        yield starting
     finally:
         for process in others:
             process.terminate()
             process.wait()
+
+
+def _start_all(
+    tell: Callable[[str], object], workers: int | None, missing: Sequence[str]
+) -> list[subprocess.Popen[bytes]]:
+    """The other processes, each with its part of what is missing; the last first."""
+    if not missing or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        return []
+    count = min(num_workers(workers), MAX_PROCESSES)
+    seconds = SECONDS_A_KERNEL * len(missing) / count
+    what = "1 kernel is" if len(missing) == 1 else f"{len(missing)} kernels are"
+    tell(f"first run: {what} compiled, once; that takes some {seconds:.0f} s")
+    return [_start(missing[::-1][k :: count - 1]) for k in range(count - 1)]
 
 
 def _start(names: Sequence[str]) -> subprocess.Popen[bytes]:

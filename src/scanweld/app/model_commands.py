@@ -164,7 +164,7 @@ def run(options: RunOptions) -> None:
     processes = options.workers if memory is None else 1  # others would take memory too
     try:
         with (
-            compiling_ahead(options.show.tell, processes, of_video=options.video),
+            compiling_ahead(options.show.tell, processes, of_video=options.video) as starting,
             options.show.reporting() as progress,
         ):
             size = None if memory is None else parse_size(memory)
@@ -181,7 +181,7 @@ def run(options: RunOptions) -> None:
                 knowledge=known,
                 limits=limits,
                 force=options.force,
-                progress=progress,
+                progress=starting(progress),
             )
     except KeyboardInterrupt:
         kept = cache_folder(output)
@@ -221,7 +221,7 @@ def fuse(options: FuseOptions) -> None:
 
     settings = load_config(options.config, unit=options.unit, fusion=options.surface.settings())
     with (
-        compiling_ahead(options.show.tell, options.workers),
+        compiling_ahead(options.show.tell, options.workers) as starting,
         options.show.reporting() as progress,
     ):
         result = fuse_job(
@@ -231,7 +231,7 @@ def fuse(options: FuseOptions) -> None:
             settings,
             limits=Limits(workers=options.workers, keeps=not options.no_cache),
             force=options.force,
-            progress=progress,
+            progress=starting(progress),
         )
     options.show.finish(result, options.output)
 

@@ -201,7 +201,7 @@ class ShowOptions:
         return reporting(quiet=self.quiet, verbose=self.verbose, as_json=self.as_json)
 
     def tell(self, line: str) -> None:
-        """Say something to whoever watches a run, before its progress is shown."""
+        """Say something to whoever watches a run."""
         if not (self.quiet or self.as_json):
             typer.echo(line, err=True)
 
