@@ -19,7 +19,7 @@ from tests.view_graphs import DrawnJudge, graph_with, seen, world_of
 
 LIMITS = PatchLimits(contradiction=0.1, free=0.05)
 CODES = [
-    *("camera_stood", "alone", "moved_part", "violated", "unpaired", "mark_only"),
+    *("camera_stood", "alone", "moved_part", "violated", "inside", "unpaired", "mark_only"),
     *("not_refined", "disagreement", "off_axis", "scale", "inexact", "confidence"),
 ]
 
@@ -72,6 +72,28 @@ def test_a_part_that_two_pairs_see_through_is_doubted_and_a_shadow_in_one_is_not
         1: [*violated, "unpaired"],
         2: [*violated, "unpaired"],
     }
+
+
+@pytest.mark.parametrize(
+    ("accusing", "accused"),
+    [
+        ([(0, 1)], {0, 1}),  # nobody knows which
+        ([(0, 2), (1, 2), (2, 3)], {2}),
+        ([(0, 1), (0, 2), (0, 3), (3, 4)], {0, 3, 4}),
+        ([], set()),
+    ],
+)
+def test_a_false_inside_is_that_of_the_scan_that_most_others_accuse(
+    accusing: list[tuple[int, int]], accused: set[int]
+):
+    graph = graph_with({}, Component(poses=dict(enumerate(world_of(5))), reference=0))
+
+    def says(i: int, j: int, i_from_j: Pose) -> Evidence:
+        return replace(seen(0.2), inside_patch=0.05 * ((min(i, j), max(i, j)) in accusing))
+
+    doubts = find_doubts(graph, DrawnJudge(says=says, limits=LIMITS))
+    told = {k for k, some in doubts.items() if DoubtCode.INSIDE in {one.code for one in some}}
+    assert told == accused
 
 
 def test_doubts_are_written_and_read_back(tmp_path: Path):

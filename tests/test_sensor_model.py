@@ -119,8 +119,8 @@ def test_what_violates_together_counts_and_what_is_scattered_does_not(
     pair, _ = found
     i, j = pair.fields
     tolerance = USUAL * pair.diameter
-    ((front, free),) = violating_patches(i, j, [pair.i_from_j], tolerance)
-    assert front < 0.01 and free < 0.01
+    ((front, free, inside),) = violating_patches(i, j, [pair.i_from_j], tolerance)
+    assert front < 0.01 and free < 0.01 and inside < 0.01
     # One in twenty of j's samples pulled out of its surface: at random, and all in one place.
     count = len(j.points) // 20
     rng = np.random.default_rng(5)
@@ -135,7 +135,24 @@ def test_what_violates_together_counts_and_what_is_scattered_does_not(
         sizes.append(violating_patches(i, moved, [pair.i_from_j], tolerance)[0].sum())
     assert sizes[1] > 2.5 * sizes[0]
     swapped = violating_patches(j, i, [pair.i_from_j.inverse()], tolerance)
-    np.testing.assert_allclose(swapped, [[front, free]], atol=0.01)
+    np.testing.assert_allclose(swapped, [[front, free, inside]], atol=0.01)
+
+
+def test_a_surface_without_thickness_shows_its_inside_and_a_wall_does_not(
+    found: tuple[PreparedPair, PairResult],
+):
+    pair, result = found
+    i, j = pair.fields
+    tolerance = USUAL * pair.diameter
+    thickness = tolerance / 4
+    assert result.best is not None
+
+    def inside(depth: float) -> float:
+        turned = replace(j, normals=-j.normals, points=j.points - depth * j.normals)
+        return violating_patches(i, turned, [pair.i_from_j], tolerance, thickness)[0, 2]
+
+    assert inside(0.0) > 0.3 * result.best.evidence.agree
+    assert inside(2 * thickness) < 0.01
 
 
 def test_a_pair_is_contradicted_by_the_limit_of_its_set(found: tuple[PreparedPair, PairResult]):

@@ -41,7 +41,7 @@ KERNELS = {
     "evidence.icp._refine_all": "f8w2 f8w2 f8w2 i4w3 f8w1 f8w2 f8w2 f8w2 i4w3 f8w1 f8w2 f8w1 i8 "
     "f8w1 f8",
     "evidence.visibility.count_evidence": "f8w1 f4w3 f8w2 f8w2 f8w1 f4w3 f8w2 f8w2 f8w2 i8 f8",
-    "evidence.sample_patches._largest_patches": "f8w1 f4w3 f8w2 f8w2 i4w2 f8w2 f8",
+    "evidence.sample_patches._largest_patches": "f8w1 f4w3 f8w2 f8w2 i4w2 f8w2 f8 f8",
     "refinement.surface_terms._closest_planes": "f8w2 f8w2 f8r2 f8w1 f8r2 f8 f8r3 b1w2 f8 f8w2 "
     "f8w1",
     "geometry.gauss_newton._jacobian": "f8w2 f8w2 f8w1 f8 f8w2",

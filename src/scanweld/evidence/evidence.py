@@ -40,10 +40,12 @@ class PatchLimits:
     Attributes:
         contradiction: Both patches over what agrees, weighted as in ``Evidence.contradiction``.
         free: The patch in free space, as a share of all samples.
+        thickness: How far the two sides of an object lie apart, at least, in the scans' unit.
     """
 
     contradiction: float
     free: float = NO_LIMIT
+    thickness: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -64,6 +66,7 @@ class Evidence:
         front_patch: Largest patch of samples that hang together before a surface
             (``violating_patches``); 0 where that was not asked.
         free_patch: The same in free space.
+        inside_patch: The same on a surface that faces the other way, as if that had no thickness.
     """
 
     agree: float
@@ -75,6 +78,7 @@ class Evidence:
     grazing: float = 0.0
     front_patch: float = 0.0
     free_patch: float = 0.0
+    inside_patch: float = 0.0
 
     @property
     def score(self) -> float:

@@ -75,7 +75,7 @@ class Judge:
         """The same at several poses, in one call of the kernel."""
         a, b = self.fields[i], self.fields[j]
         both = evidence_shares(a, b, pose_rows(i_from_j), self.tolerance, NUM_JUDGED_SAMPLES)
-        patches = violating_patches(a, b, i_from_j, self.tolerance)
+        patches = violating_patches(a, b, i_from_j, self.tolerance, self.limits.thickness)
         mean = 0.5 * (both[:, 0] + both[:, 1])
         return [evidence_of(*told) for told in zip(mean.tolist(), patches.tolist(), strict=True)]
 

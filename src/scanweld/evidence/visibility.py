@@ -92,9 +92,9 @@ def kernel_view(
     return field.camera, field.raster, field.points, field.normals
 
 
-def evidence_of(shares: Sequence[float], patches: Sequence[float] = (0.0, 0.0)) -> Evidence:
-    """Shares (8,) of the kinds, and the two patches, as a record."""
-    front_patch, free_patch = patches
+def evidence_of(shares: Sequence[float], patches: Sequence[float] = (0.0, 0.0, 0.0)) -> Evidence:
+    """Shares (8,) of the kinds, and the three patches, as a record."""
+    front_patch, free_patch, inside_patch = patches
     return Evidence(
         agree=shares[AGREE],
         front=shares[FRONT],
@@ -105,6 +105,7 @@ def evidence_of(shares: Sequence[float], patches: Sequence[float] = (0.0, 0.0)) 
         unknown=shares[UNKNOWN],
         front_patch=front_patch,
         free_patch=free_patch,
+        inside_patch=inside_patch,
     )
 
 

@@ -12,6 +12,7 @@ class DoubtCode(StrEnum):
     ALONE = "alone"
     MOVED_PART = "moved_part"
     VIOLATED = "violated"
+    INSIDE = "inside"
     UNPAIRED = "unpaired"
     MARK_ONLY = "mark_only"
     NOT_REFINED = "not_refined"

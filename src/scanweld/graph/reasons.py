@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from scanweld.evidence.evidence import MAX_EXCESS, Evidence, seen_twice
 from scanweld.evidence.judge import PairJudge
 from scanweld.evidence.slippage import Slide, slide_words
 from scanweld.geometry.arrays import FloatArray
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.graph.doubts import Doubt, DoubtCode, doubt_of, merged
 from scanweld.graph.view_graph import Component, Edge, ViewGraph
+from scanweld.graph.violations import violation_doubts
 from scanweld.pairs.result import PairKind, PairResult
 from scanweld.pairs.symmetry import fold_words
 
@@ -98,24 +98,11 @@ def _rest_on_feature_alone(graph: ViewGraph, component: Component) -> set[int]:
 def find_doubts(graph: ViewGraph, judge: PairJudge) -> dict[int, tuple[Doubt, ...]]:
     """What speaks against the final poses of placed scans, by scan; known doubts stay."""
     marked: dict[int, str] = {}
-    moved: dict[int, str] = {}
-    violated: dict[int, str] = {}
     unpaired: dict[int, str] = {}
     disagree: dict[int, str] = {}
     for component in graph.components:
         for k in _rest_on_feature_alone(graph, component):
             marked[k] = "only a small mark decides its pose: others hide the mark"
-        in_front, in_free_space = _unexplained(graph, component, judge)
-        for k, share in in_front.items():
-            moved[k] = (
-                f"a part of {share:.0%} of its surface lies before what another sensor saw: a part "
-                "of the object moved, or a pose is wrong"
-            )
-        for k, share in in_free_space.items():
-            violated[k] = (
-                f"a part of {share:.0%} of its surface lies where another sensor saw through: a "
-                "part of the object moved, or a pose is wrong"
-            )
         for k in component.poses:
             if not graph.neighbours(k):
                 unpaired[k] = "no single pair confirms its pose"
@@ -127,8 +114,7 @@ def find_doubts(graph: ViewGraph, judge: PairJudge) -> dict[int, tuple[Doubt, ..
     return merged(
         graph.doubts,
         doubt_of(DoubtCode.MARK_ONLY, marked),
-        doubt_of(DoubtCode.MOVED_PART, moved),
-        doubt_of(DoubtCode.VIOLATED, violated),
+        *(violation_doubts(graph, component, judge) for component in graph.components),
         doubt_of(DoubtCode.UNPAIRED, unpaired),
         doubt_of(DoubtCode.DISAGREEMENT, disagree),
     )
@@ -154,38 +140,6 @@ def best_first(graph: ViewGraph) -> ViewGraph:
 
 def _strength(scan: int, graph: ViewGraph) -> float:
     return sum(max(option.score, 0.0) for edge, option in graph.accepted.items() if scan in edge)
-
-
-def _unexplained(
-    graph: ViewGraph, component: Component, judge: PairJudge
-) -> tuple[dict[int, float], dict[int, float]]:
-    """Largest part of each scan, or of one beside it, that the set's sensor does not excuse.
-
-    Before the surface that another sensor saw, and in its free space.
-    """
-    poses = component.poses
-    told = {
-        (i, j): judge.pair(i, j, poses[i].inverse() @ poses[j])
-        for i, j in graph.compared(component)
-    }
-    limits = judge.limits
-    in_front = {e: said for e, said in told.items() if said.front_excess(limits) > MAX_EXCESS}
-    in_free_space: dict[Edge, Evidence] = {}
-    if seen_twice(said.free_excess(limits) for said in told.values()) > MAX_EXCESS:
-        in_free_space = {e: d for e, d in told.items() if d.free_excess(limits) > MAX_EXCESS}
-    return (
-        _largest({edge: said.front_patch for edge, said in in_front.items()}),
-        _largest({edge: said.free_patch for edge, said in in_free_space.items()}),
-    )
-
-
-def _largest(of_pairs: Mapping[Edge, float]) -> dict[int, float]:
-    """The largest of each scan's pairs."""
-    found: dict[int, float] = {}
-    for edge, value in of_pairs.items():
-        for k in edge:
-            found[k] = max(found.get(k, 0.0), value)
-    return found
 
 
 def _good_but_rejected(graph: ViewGraph) -> list[Edge]:

@@ -69,7 +69,9 @@ class SensorModel:
     @property
     def limits(self) -> PatchLimits:
         """What the set excuses."""
-        return PatchLimits(contradiction=self.max_contradiction, free=self.max_free_patch)
+        return PatchLimits(
+            contradiction=self.max_contradiction, free=self.max_free_patch, thickness=self.sigma
+        )
 
     @property
     def misclosure(self) -> float:
