@@ -15,6 +15,7 @@ from scanweld.preparation import prepare
 from scanweld.refinement.surface_terms import SurfaceSource, surface_source
 from scanweld.sensor.accuracy import carried_twist, pose_deviations
 from scanweld.sensor.model import SensorModel
+from scanweld.sensor.network import PairNetwork, PairTie
 from tests.scenes import creature_scene, random_motion
 
 NUM_SCANS = 6
@@ -41,7 +42,7 @@ def deviations(
 ) -> Mapping[int, PoseTolerance]:
     """By a sensor whose errors are these shares of the diameter."""
     sources, poses, diameter = ring
-    told = {"white": 1e-4, "correlated": 1e-5, "closure": 0.0} | shares
+    told = {"white": 1e-4, "correlated": 1e-5} | shares
     sensor = SensorModel(
         num_certain=9,
         sigma=1e-3 * diameter,
@@ -50,8 +51,6 @@ def deviations(
         tolerance=0.01 * diameter,
         max_contradiction=0.1,
         diameter=diameter,
-        closure=told["closure"] * diameter,
-        num_cycles=1000,
     )
     moved = {k: (world or Pose.identity()) @ pose for k, pose in poses.items()}
     held = {k: moved[k] for edge in edges for k in edge} if edges else moved
@@ -60,27 +59,57 @@ def deviations(
     )
 
 
-def test_a_pair_is_no_surer_than_cycles_close_however_exact_its_points(ring: Ring):
-    """A displacement c in six directions alike, half of it in either scan."""
-    closure, diameter = 0.01, ring[2]
-    (a, b) = deviations(ring, [(0, 1)], closure=closure).values()
-    expected = closure * diameter * np.sqrt(3.0 / 6.0) / 2.0
-    for one in (a, b):
-        turned = np.radians(one.angle_deg) * lever_arm(diameter)
-        assert turned == pytest.approx(expected, rel=0.1)
-        assert one.shift == pytest.approx(expected, rel=0.5)
-    exact, _ = deviations(ring, [(0, 1)]).values()
-    assert exact.shift < 0.1 * a.shift
+def drawn_network(edges: Sequence[tuple[int, int]], error: float, seed: int = 0) -> PairNetwork:
+    """Pairs that points hold most firmly, each of which is amiss by an error of its own."""
+    rng = np.random.default_rng(seed)
+    num_scans, firm = 1 + max(k for edge in edges for k in edge), np.full(6, 1e8)
+    ties = [
+        PairTie(
+            a=a,
+            b=b,
+            firmness=firm,
+            directions=np.eye(6),
+            pull=firm * error / np.sqrt(6.0) * rng.normal(size=6),
+            by_a=np.eye(6),
+            by_b=np.eye(6),
+        )
+        for a, b in edges
+    ]
+    alike = np.tile(np.eye(6), (num_scans, 1)) / np.sqrt(num_scans)
+    free = np.linalg.svd(alike, full_matrices=True)[0][:, 6:]
+    return PairNetwork(ties=ties, free=free, diameter=1.0)
 
 
-def test_more_pairs_make_poses_surer_and_the_end_of_a_chain_is_least_sure(ring: Ring):
+def test_pairs_that_miss_each_other_tell_their_error_however_exact_their_points():
+    edges = list(combinations(range(10), 2))
+    found = [drawn_network(edges, 0.01, seed).pair_error(apart=1e-4) for seed in range(5)]
+    assert np.mean(found) == pytest.approx(0.01, rel=0.1)
+    assert drawn_network(edges, 0.0).pair_error(apart=1e-4) < 1e-4
+    assert drawn_network(edges, 0.5).pair_error(apart=0.0) < 0.06, "farther off is another pose"
+    chain = [(k, k + 1) for k in range(9)]
+    assert drawn_network(chain, 0.01).redundancy == 0
+    usual = drawn_network(chain, 0.01).pair_error(apart=0.002)
+    assert usual == drawn_network(chain, 0.02).pair_error(apart=0.002) > 0, "a chain tells nothing"
+
+
+def test_a_pair_is_no_surer_than_its_error_however_exact_its_points():
+    """A displacement in six directions alike, half of it in either scan."""
+    covariance = drawn_network([(0, 1)], 0.0).covariance(0.01)
+    shifts = np.sqrt(np.diag(covariance).reshape(2, 2, 3).sum(axis=2))
+    np.testing.assert_allclose(shifts, 0.01 * np.sqrt(3.0 / 6.0) / 2.0, rtol=1e-2)
+    exact = drawn_network([(0, 1)], 0.0).covariance(0.0)
+    assert np.trace(exact) < 1e-3 * np.trace(covariance)
+
+
+def test_more_pairs_make_poses_surer_and_the_end_of_a_chain_is_least_sure():
     chain = [(k, k + 1) for k in range(NUM_SCANS - 1)]
-    alone = deviations(ring, chain, closure=0.01)
-    closed = deviations(ring, [*chain, (0, NUM_SCANS - 1)], closure=0.01)
-    assert all(closed[k].shift < alone[k].shift for k in (0, NUM_SCANS - 1))
-    assert alone[0].angle_deg > 1.3 * alone[NUM_SCANS // 2].angle_deg
-    angles = [one.angle_deg for one in closed.values()]
-    assert max(angles) < 1.2 * min(angles), "a ring has no ends"
+    alone, closed = (
+        np.diag(drawn_network(edges, 0.0).covariance(0.01))[::6]
+        for edges in (chain, [*chain, (0, NUM_SCANS - 1)])
+    )
+    assert all(closed < alone)
+    assert alone[0] > 1.3 * alone[NUM_SCANS // 2]
+    np.testing.assert_allclose(closed, closed[0], rtol=1e-3, err_msg="a ring has no ends")
 
 
 def test_shared_errors_count_more_than_noise_and_neither_world_nor_pairs_order_matter(ring: Ring):

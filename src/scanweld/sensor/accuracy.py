@@ -3,7 +3,7 @@
 A sensor's noise averages out over a surface, its bent depth does not: neighbouring points are off
 together. So the points of a patch tell no more than the patch: its mean has the correlated error,
 and what is left of the noise. The information of all patches of a pair (J^T J over the variance)
-holds it no more firmly than cycles of pairs close; all pairs together make the covariance of all
+holds it no more firmly than it suits the other pairs; all pairs together make the covariance of all
 poses at once, beside the component as a whole.
 """
 
@@ -21,6 +21,7 @@ from scanweld.refinement.refine import SURFACE_NOISE_DIAMETERS, match_surfaces
 from scanweld.refinement.surface_terms import SurfaceSource
 from scanweld.sensor.learn import PATCH_DIAMETERS
 from scanweld.sensor.model import SensorModel
+from scanweld.sensor.network import PairNetwork, PairTie
 
 
 def pose_deviations(
@@ -46,7 +47,13 @@ def pose_deviations(
     radius = max(sensor.reach, 0.006 * diameter)
     found = match_surfaces(sources, world_from_sensor, pairs, radius, workers)
     middles = {k: world_from_sensor[k].apply(_middle(sources[k])) for k in order}
-    covariance = _covariance(found, order, world_from_sensor, middles, sensor)
+    network = PairNetwork(
+        ties=_ties(found, world_from_sensor, middles, sensor),
+        free=_without_common_motion(order, middles, lever_arm(diameter)),
+        diameter=diameter,
+    )
+    apart = float(np.hypot(sensor.white, sensor.correlated))
+    covariance = network.covariance(network.pair_error(apart))
     arm = lever_arm(diameter)
     deviations = {}
     for n, k in enumerate(order):
@@ -62,33 +69,32 @@ def _middle(source: SurfaceSource) -> FloatArray:
     return source.points.mean(axis=0) if len(source.points) else np.zeros(3)
 
 
-def _covariance(
+def _ties(
     found: Sequence[tuple[int, int, Matches]],
-    order: Sequence[int],
     poses: Mapping[int, Pose],
     middles: Mapping[int, FloatArray],
     sensor: SensorModel,
-) -> FloatArray:
-    """(6 N, 6 N) of twists, each about the middle of its scan, the mean of all being none."""
-    place = {k: slice(6 * n, 6 * n + 6) for n, k in enumerate(order)}
-    diameter = sensor.diameter
-    size, arm = 6 * len(order), lever_arm(diameter)
-    normal = np.zeros((size, size))
+) -> list[PairTie]:
+    """What the matches of each pair say of it, about a centre between its scans."""
+    place = {k: n for n, k in enumerate(sorted(poses))}
+    arm = lever_arm(sensor.diameter)
+    ties = []
     for (i, j), ways in _by_pair(found).items():
         between = 0.5 * (middles[i] + middles[j])
-        firmness = _firmness(ways, poses, between, sensor)
-        by_i, by_j = (carried_twist(middles[k] - between, arm) for k in (i, j))
-        a, b = place[i], place[j]
-        normal[a, a] += by_i.T @ firmness @ by_i
-        normal[b, b] += by_j.T @ firmness @ by_j
-        cross = by_i.T @ firmness @ by_j
-        normal[a, b] -= cross
-        normal[b, a] -= cross.T
-    free = _without_common_motion(order, middles, arm)
-    inner = free.T @ normal @ free
-    # What nothing holds may be off by a diameter.
-    inner += np.eye(len(inner)) / diameter**2
-    return free @ np.linalg.inv(inner) @ free.T
+        information, gradient = _normal_equations((i, j), ways, poses, between, sensor)
+        firmness, directions = np.linalg.eigh(information)
+        ties.append(
+            PairTie(
+                a=place[i],
+                b=place[j],
+                firmness=np.maximum(firmness, 0.0),
+                directions=directions,
+                pull=directions.T @ gradient,
+                by_a=carried_twist(middles[i] - between, arm),
+                by_b=carried_twist(middles[j] - between, arm),
+            )
+        )
+    return ties
 
 
 def _by_pair(
@@ -101,27 +107,25 @@ def _by_pair(
     return dict(sorted(pairs.items()))
 
 
-def _firmness(
+def _normal_equations(
+    edge: tuple[int, int],
     ways: Sequence[tuple[int, Matches]],
     poses: Mapping[int, Pose],
     centre: FloatArray,
     sensor: SensorModel,
-) -> FloatArray:
-    """Inverse covariance (6, 6) of the twist between two scans, about a centre.
-
-    However many points they share, bent depth leaves the pose as far off as cycles of pairs do
-    not close: that covariance is added to the points', a sixth of a twist as long as the
-    misclosure in each direction.
-    """
-    diameter, information = sensor.diameter, np.zeros((6, 6))
-    for j, matches in ways:
-        points, directions = poses[j].apply(matches.points), poses[j].turn(matches.directions)
-        weights = match_weights(matches.points, sensor)[:, None]
-        moves = jacobian(points, directions, centre, lever_arm(diameter))
-        information += (weights * moves).T @ moves
-    firm, directions = np.linalg.eigh(information)
-    firm = np.maximum(firm, 0.0)
-    return (directions * (firm / (1.0 + firm * sensor.misclosure**2 / 6.0))) @ directions.T
+) -> tuple[FloatArray, FloatArray]:
+    """Information (6, 6) and gradient (6,) of the twist of a pair's first scan about a centre."""
+    information, gradient = np.zeros((6, 6)), np.zeros(6)
+    for target, matches in ways:
+        points = poses[target].apply(matches.points)
+        directions = poses[target].turn(matches.directions)
+        weights = match_weights(matches.points, sensor)
+        moves = jacobian(points, directions, centre, lever_arm(sensor.diameter))
+        if target == edge[0]:
+            moves = -moves  # the points are those of the second scan
+        information += (weights[:, None] * moves).T @ moves
+        gradient += moves.T @ (weights * matches.residuals)
+    return information, gradient
 
 
 def carried_twist(away: FloatArray, arm: float) -> FloatArray:

@@ -16,7 +16,7 @@ from scanweld.geometry.gauss_newton import MAD_TO_SIGMA
 from scanweld.pairs.result import PairResult
 from scanweld.pairs.verdict import MAX_CONTRADICTION
 from scanweld.sensor.certain import Edge, certain_pairs
-from scanweld.sensor.closure import closure_of
+from scanweld.sensor.closure import NO_CYCLES, closure_of
 from scanweld.sensor.model import NUM_SPREAD_BINS, SPREAD_SIGMAS, SensorModel
 
 MIN_CERTAIN = 2
@@ -66,11 +66,13 @@ def learn_sensor(
             tolerance=usual_tolerance,
             max_contradiction=usual_contradiction,
             diameter=diameter,
+            misclosure=NO_CYCLES.misclosure(float(np.hypot(prior, prior))),
         )
     sigma = MAD_TO_SIGMA * float(np.median(np.abs(residuals)))
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
     closure = closure_of(pairs, fields, diameter)
-    across = closure.displacement / np.sqrt(3.0)  # of a displacement that prefers no direction
+    misclosure = closure.misclosure(float(np.hypot(white, correlated)))
+    across = misclosure / np.sqrt(3.0)  # of a displacement that prefers no direction
     sigma = float(np.hypot(sigma, across))
     limit, most_free = usual_contradiction, NO_LIMIT
     if len(certain) >= MIN_CERTAIN:
@@ -89,7 +91,7 @@ def learn_sensor(
         diameter=diameter,
         max_free_patch=most_free,
         closure=closure.displacement,
-        num_cycles=closure.num_cycles,
+        misclosure=misclosure,
         spread=_spread(residuals, sigma),
     )
 

@@ -1,6 +1,5 @@
 """What a set of scans says about its sensor, in numbers and in words."""
 
-import math
 from dataclasses import dataclass
 
 from scanweld.evidence.evidence import NO_LIMIT, PatchLimits
@@ -14,10 +13,6 @@ CLOSURE = (
     "around cycles poses of pairs miss each other by {:.1%} each, as where depth is bent over "
     "whole scans"
 )
-USUAL_MISCLOSURE, USUAL_CYCLES = 2.0, 2
-"""How far a pair moves a scan amiss as a rule, over the distance between surfaces that coincide
-(mean of the 33 sets of the calibration that have cycles), and as how many cycles that counts beside
-those of the set."""
 SPREAD_SIGMAS, NUM_SPREAD_BINS = 5.0, 41
 """How far the spread of the distances is told, in standard deviations, and in how many bins."""
 
@@ -34,9 +29,10 @@ class SensorModel:
             each scan having one pose.
         white: The part of it that neighbouring points do not share: the sensor's noise.
         correlated: The part that they share: bent depth, a scale that is a little off.
-        closure: How far one pair's pose moves a scan amiss, seen where cycles of pairs stay open;
-            the whole contains what surfaces lie apart by it.
-        num_cycles: Cycles that tell it.
+        closure: How far one pair's pose moves a scan amiss, where cycles of pairs that stay open
+            show it.
+        misclosure: The same beside what is usual of such surfaces (``Closure.misclosure``); the
+            whole contains what surfaces lie apart by it.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
         diameter: Of the run.
@@ -57,7 +53,7 @@ class SensorModel:
     diameter: float
     max_free_patch: float = NO_LIMIT
     closure: float = 0.0
-    num_cycles: int = 0
+    misclosure: float = 0.0
     margin: float = 0.0
     spread: tuple[int, ...] = ()
 
@@ -72,16 +68,6 @@ class SensorModel:
         return PatchLimits(
             contradiction=self.max_contradiction, free=self.max_free_patch, thickness=self.sigma
         )
-
-    @property
-    def misclosure(self) -> float:
-        """How far the pose of one pair moves a scan amiss, in the scans' unit.
-
-        What cycles show, and what is usual of such surfaces: that counts more, the fewer there are.
-        """
-        usual = USUAL_MISCLOSURE * math.hypot(self.white, self.correlated)
-        squares = USUAL_CYCLES * usual**2 + self.num_cycles * self.closure**2
-        return math.sqrt(squares / (USUAL_CYCLES + self.num_cycles))
 
     @property
     def _misses(self) -> bool:
