@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scanweld.config import PrepareConfig
-from scanweld.geometry.gauss_newton import jacobian, lever_arm
+from scanweld.geometry.gauss_newton import jacobian
 from scanweld.geometry.pose import Pose
 from scanweld.geometry.pose_tolerance import PoseTolerance
 from scanweld.geometry.prepared import PreparedScan
