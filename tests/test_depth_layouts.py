@@ -224,6 +224,19 @@ def test_broken_poses_are_none_and_said(tmp_path: Path):
     assert all("not one pose for each" in " ".join(scan.notes) for scan in scans)
 
 
+@pytest.mark.parametrize("name", ["TUM", "7-Scenes", "BOP", "Polycam"])
+def test_images_that_a_layout_lists_and_that_are_gone_are_told(name: str, tmp_path: Path):
+    MADE[name](tmp_path)
+    assert not any("not there" in note for scan in scans_of(tmp_path) for note in scan.notes)
+    depths = [p for p in tmp_path.rglob("*.png") if "depth" in str(p.relative_to(tmp_path))]
+    gone = min(depths)
+    gone.unlink()
+    (left,) = scans_of(tmp_path, color=Path("none"))
+    (told,) = [note for note in left.notes if "lists images that are not there: " in note]
+    number = told.rsplit(": ", 1)[1].split(".")[0].removeprefix("frame-")
+    assert int(number) == int(gone.name.split(".")[0].removeprefix("frame-"))
+
+
 def test_the_poses_of_a_layout_are_tried_and_what_came_of_them_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

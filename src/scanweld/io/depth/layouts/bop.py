@@ -14,7 +14,13 @@ from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
 from scanweld.io.depth.images import by_name
 from scanweld.io.depth.intrinsics import intrinsics_of_entry
-from scanweld.io.depth.layouts.records import Layout, Shot, images_in, pose_or_none
+from scanweld.io.depth.layouts.records import (
+    Layout,
+    Shot,
+    images_in,
+    missing_notes,
+    pose_or_none,
+)
 from scanweld.io.depth.pixels import SUFFIXES
 from scanweld.io.poses import load_json, read_text
 
@@ -36,6 +42,8 @@ def read(folder: Path) -> list[Shot]:
     has_several = any(len(found) > 1 for found in masks.values())
     told = "mask_visib has masks of several objects; --masks 'mask_visib/*_000000.png' cuts to one"
     colors = by_name(images, folder, _COLORS)
+    numbers = (str(int(image.stem)) for image in images if image.stem.isdigit())
+    missing = missing_notes(_CAMERAS, cameras, numbers)
     shots = []
     for image in images:
         entry = cameras.get(str(int(image.stem))) if image.stem.isdigit() else None
@@ -51,7 +59,7 @@ def read(folder: Path) -> list[Shot]:
                 intrinsics=intrinsics,
                 per_meter=intrinsics.depth_scale,
                 world_from_camera=_pose(own[0], "m2c") if len(own) == 1 else _pose(entry, "w2c"),
-                notes=(told,) * has_several,
+                notes=(told,) * has_several + missing,
             )
         )
     return shots

@@ -15,6 +15,7 @@ from scanweld.io.depth.layouts.records import (
     Shot,
     fitted,
     images_in,
+    missing_notes,
     pose_or_none,
 )
 from scanweld.io.matrices import from_opengl
@@ -41,6 +42,8 @@ def read(folder: Path) -> list[Shot]:
     cameras = next(name for name in _CAMERAS if (inside / name).is_dir())
     images = images_in(inside / "depth", ".png")
     colors = by_name(images, inside, (_CAMERAS[cameras],))
+    listed = (path.stem for path in (inside / cameras).glob("*.json"))
+    missing = missing_notes(cameras, listed, (image.stem for image in images))
     shots = []
     for image in images:
         path = inside / cameras / f"{image.stem}.json"
@@ -56,6 +59,7 @@ def read(folder: Path) -> list[Shot]:
                 color=colors.get(image),
                 intrinsics=fitted(intrinsics_of_entry(path, entry), image),
                 world_from_camera=None if pose is None else from_opengl(pose),
+                notes=missing,
             )
         )
     return shots

@@ -1,13 +1,13 @@
 """What a layout says of itself, and what it knows of each depth image."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from scanweld.errors import ReadError
+from scanweld.errors import ReadError, some_of
 from scanweld.geometry.pose import Pose
 from scanweld.io.depth.colors import is_same_view
 from scanweld.io.depth.intrinsics import Intrinsics
@@ -84,6 +84,18 @@ def images_in(folder: Path, *suffixes: str) -> list[Path]:
         (path for path in found if not path.name.startswith(".")),
         key=lambda path: natural_key(path.name),
     )
+
+
+def missing_notes(where: str, listed: Iterable[str], there: Iterable[str]) -> tuple[str, ...]:
+    """What is to be said of images that a layout lists and that are not there; nothing if all are.
+
+    Args:
+        where: What lists them.
+        listed: What it calls them.
+        there: The same of the images that were found.
+    """
+    missing = sorted(set(listed).difference(there), key=natural_key)
+    return (f"{where} lists images that are not there: {some_of(missing)}",) * bool(missing)
 
 
 def numbers_in(path: Path) -> list[float]:

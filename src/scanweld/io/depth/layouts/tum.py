@@ -12,7 +12,7 @@ import numpy as np
 from scanweld.errors import ReadError
 from scanweld.geometry.pose import Pose
 from scanweld.io.depth.intrinsics import Intrinsics
-from scanweld.io.depth.layouts.records import Layout, Shot, images_in
+from scanweld.io.depth.layouts.records import Layout, Shot, images_in, missing_notes
 from scanweld.io.depth.pixels import SUFFIXES
 from scanweld.io.pose_formats.quaternions import pose_from_quaternion
 from scanweld.io.pose_formats.records import are_numbers
@@ -32,8 +32,10 @@ def read(folder: Path) -> list[Shot]:
     when = {Path(words[1]).name: float(words[0]) for words in _rows(folder / "depth.txt", 2)}
     colors = _Timed(_rows(folder / "rgb.txt", 2))
     poses = _Timed(_rows(folder / "groundtruth.txt", 8))
+    images = images_in(folder / "depth", *SUFFIXES)
+    missing = missing_notes("depth.txt", when, (image.name for image in images))
     shots = []
-    for image in images_in(folder / "depth", *SUFFIXES):
+    for image in images:
         time = when.get(image.name)
         color = None if time is None else colors.nearest(time)
         pose = None if time is None else poses.nearest(time)
@@ -42,7 +44,8 @@ def read(folder: Path) -> list[Shot]:
                 depth=image,
                 color=None if color is None else folder / color[1],
                 world_from_camera=None if pose is None else _pose(folder, pose),
-                notes=("depth.txt does not list it: no colour, no pose",) * (time is None),
+                notes=("depth.txt does not list it: no colour, no pose",) * (time is None)
+                + missing,
             )
         )
     return shots
