@@ -14,7 +14,6 @@ from scanweld.pairs.result import Alternative, PairResult, margin_among, refutat
 
 Grounds = Mapping[str, float]
 
-LEAST_SHARE = 1e-3
 LEAST_OBSERVABILITY = 1e-7
 MAX_RATIO = 10.0
 """Of misfits over what the sensor leaves of them, or the inverse: beyond, all say the same."""
@@ -85,7 +84,6 @@ def scan_grounds(
     """
     fit = joint.fits[k]
     return {
-        "consent": -violated(joint.said_of(k)),
         "margin": joint.margins[k],
         "refutation": joint.refutations[k],
         "observability": float(np.log10(max(fit.observability, LEAST_OBSERVABILITY))),
@@ -103,9 +101,3 @@ def _magnitude(ratio: float) -> float:
 def is_corroborated(support: float) -> bool:
     """Whether other accepted pairs hold the two scans of a pair together."""
     return support > MIN_CORROBORATION
-
-
-def violated(said: list[Evidence]) -> float:
-    """Samples that other sensors contradict, as a share of those that agree."""
-    agree = sum(e.agree for e in said)
-    return sum(e.surface_violation for e in said) / max(agree, LEAST_SHARE)

@@ -55,10 +55,6 @@ class JointEvidence:
         """Conductance between the scans of an accepted pair of that score without the pair."""
         return max(self.conductance[edge] - max(score, MIN_CONDUCTANCE), 0.0)
 
-    def said_of(self, scan: int) -> list[Evidence]:
-        """The evidence between a scan and each other one."""
-        return _said_of(scan, self.between)
-
 
 def joint_evidence(
     graph: ViewGraph, component: Component, diagnostics: PairDiagnostics, workers: int = 1
