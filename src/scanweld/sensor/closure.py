@@ -5,7 +5,6 @@ each other. But it gives way differently in every pair, so that cycles of pairs 
 is left open is by how much surfaces lie apart once all scans have one pose each.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -21,10 +20,9 @@ from scanweld.sensor.certain import Edge
 
 MIN_CYCLES = 2
 """One cycle may close, or not, by chance."""
-USUAL_MISCLOSURE, USUAL_CYCLES = 2.0, 2
+USUAL_MISCLOSURE = 2.0
 """How far a pair moves a scan amiss as a rule, over the distance between surfaces that coincide
-(mean of the 33 sets of the calibration that have cycles), and as how many cycles that counts beside
-those of the set."""
+(mean of the 33 sets of the calibration that have cycles)."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -43,14 +41,14 @@ class Closure:
     def misclosure(self, apart: float) -> float:
         """How far the pose of one pair moves a scan amiss, in the scans' unit.
 
-        What cycles show, and what is usual of such surfaces: that counts more, the fewer there are.
+        What cycles show; what is usual of such surfaces where too few close.
 
         Args:
             apart: Distance between surfaces of a pair that coincide, in the scans' unit.
         """
-        squares = USUAL_CYCLES * (USUAL_MISCLOSURE * apart) ** 2
-        squares += self.num_cycles * self.displacement**2
-        return math.sqrt(squares / (USUAL_CYCLES + self.num_cycles))
+        if self.num_cycles < MIN_CYCLES:
+            return USUAL_MISCLOSURE * apart
+        return self.displacement
 
 
 NO_CYCLES = Closure(displacement=0.0, num_cycles=0)

@@ -31,7 +31,7 @@ class SensorModel:
         correlated: The part that they share: bent depth, a scale that is a little off.
         closure: How far one pair's pose moves a scan amiss, where cycles of pairs that stay open
             show it.
-        misclosure: The same beside what is usual of such surfaces (``Closure.misclosure``); the
+        misclosure: The same, or what is usual of such surfaces where too few cycles close; the
             whole contains what surfaces lie apart by it.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
