@@ -9,7 +9,7 @@ from PIL import Image
 
 from scanweld.app.video_job import take_video
 from scanweld.io.depth.capture import DepthImages
-from scanweld.work.progress import Event, StageAdvanced
+from scanweld.work.progress import Event, StageAdvanced, silent
 from tests.command_line import COARSE, error_line, scanweld
 from tests.videos import tracked, video, way_around, written
 
@@ -88,6 +88,15 @@ def test_what_is_no_video_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
         video([way_around(1, 0.0, turn)[0] for turn in (0, 90, 180, 270)]), tmp_path / "b"
     )
     assert "leave --video out if they are no video" in _refusal(apart, capsys)
+
+
+def test_frames_of_nothing_are_left_out_wherever_they_are(tmp_path: Path):
+    frames = DepthImages(inputs=[written(video(way_around(10, 22.0)), tmp_path)]).collect()
+    for frame in frames[::2]:  # those by which noise would be found
+        Image.fromarray(np.zeros((120, 160), np.uint16)).save(frame.path)
+    taken = take_video(frames, tmp_path, 1, silent)
+    assert taken.unreadable.keys() == {frame.name for frame in frames[::2]}
+    assert taken.stages["video"].counts["averaged"] + len(taken.files) == 5
 
 
 def test_a_size_that_changes_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -3,7 +3,9 @@
 import io
 import logging
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -139,19 +141,21 @@ def take_video(
 
 
 def _sensor(frames: Sequence[Frame]) -> tuple[Camera, DepthNoise]:
-    """The camera, and the noise of its depths; of frames that can be read."""
-    scans = list[RangeScan]()
-    first: ReadError | None = None
-    for frame in frames[:: -(-len(frames) // NUM_NOISE_FRAMES)]:
-        try:
-            scans.append(frame.read())
-        except ReadError as error:
-            first = first or error
-    if first is not None and not scans:
-        raise first
+    """The camera, and the noise of its depths; of some frames that can be read."""
+    some = frames[:: -(-len(frames) // NUM_NOISE_FRAMES)]
+    scans = [*_readable(some)] or [*islice(_readable(frames), NUM_NOISE_FRAMES)]
+    if not scans:
+        frames[0].read()  # says why not
     camera = scans[0].camera
     assert camera is not None
     return camera, depth_noise([depth_image(scan) for scan in scans if scan.camera == camera])
+
+
+def _readable(frames: Sequence[Frame]) -> Iterator[RangeScan]:
+    """Those that can be read."""
+    for frame in frames:
+        with suppress(ReadError):
+            yield frame.read()
 
 
 def _frames(
