@@ -24,7 +24,7 @@ MIN_CERTAIN = 2
 REACH_DIAMETERS = 0.04
 """Farthest that surfaces that should coincide may lie apart."""
 TOLERANCE_SIGMAS = 5.0
-"""Depth tolerance in standard deviations,"""
+"""Depth tolerance in standard deviations, which open cycles that were not seen add to,"""
 MAX_TOLERANCE_DIAMETERS = 0.03
 """but not more than this: what lies farther apart is another place."""
 USUAL_SPREAD = 0.75
@@ -72,8 +72,10 @@ def learn_sensor(
     white, correlated = _parts(found, sigma, PATCH_DIAMETERS * diameter)
     closure = closure_of(pairs, fields, diameter)
     misclosure = closure.misclosure(float(np.hypot(white, correlated)))
-    across = misclosure / np.sqrt(3.0)  # of a displacement that prefers no direction
-    sigma = float(np.hypot(sigma, across))
+    seen, likely = (
+        float(np.hypot(sigma, each / np.sqrt(3.0)))  # of a displacement in no direction above all
+        for each in (closure.displacement, misclosure)
+    )
     limit, most_free = usual_contradiction, NO_LIMIT
     if len(certain) >= MIN_CERTAIN:
         shown = [pair.alternatives[0].evidence for pair in certain]
@@ -81,18 +83,18 @@ def learn_sensor(
         most_free = _most_of_usual([told.free_patch for told in shown])
     return SensorModel(
         num_certain=len(certain),
-        sigma=sigma,
+        sigma=seen,
         white=white,
         correlated=correlated,
         tolerance=min(
-            max(usual_tolerance, TOLERANCE_SIGMAS * sigma), MAX_TOLERANCE_DIAMETERS * diameter
+            max(usual_tolerance, TOLERANCE_SIGMAS * likely), MAX_TOLERANCE_DIAMETERS * diameter
         ),
         max_contradiction=min(limit, MAX_CONTRADICTION),
         diameter=diameter,
         max_free_patch=most_free,
         closure=closure.displacement,
         misclosure=misclosure,
-        spread=_spread(residuals, sigma),
+        spread=_spread(residuals, seen),
     )
 
 

@@ -30,9 +30,9 @@ class SensorModel:
         white: The part of it that neighbouring points do not share: the sensor's noise.
         correlated: The part that they share: bent depth, a scale that is a little off.
         closure: How far one pair's pose moves a scan amiss, where cycles of pairs that stay open
-            show it.
+            show it; the whole contains what surfaces lie apart by it.
         misclosure: The same, or what is usual of such surfaces where too few cycles close; the
-            whole contains what surfaces lie apart by it.
+            tolerance contains it.
         tolerance: Depth tolerance by which poses are judged.
         max_contradiction: Largest patches of violating samples, over what agrees, of a right pose.
         diameter: Of the run.
